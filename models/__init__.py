@@ -1,0 +1,1 @@
+"""Models of Painter as installed data: robot, camera, gun, scenes and scenarios."""

@@ -1,0 +1,1 @@
+"""Painter: a robot that looks at a wall, works out what to paint, and paints it."""

@@ -1,0 +1,1 @@
+"""The painter command; one file a subcommand."""

@@ -1,0 +1,1 @@
+"""Diagrams: the station's two bodies and the whole paint cycle."""

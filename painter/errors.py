@@ -1,0 +1,33 @@
+"""Errors that Painter reports in one line; every one names what, where and the bound."""
+
+
+class PainterError(Exception):
+    """A job failed; the command line prints the message and exits with `exit_code`."""
+
+    exit_code = 1
+
+
+class InputError(PainterError):
+    """An input (file, field, argument) cannot be used; nothing was started."""
+
+    exit_code = 2
+
+
+class PortTypeError(PainterError):
+    """A port carries a value of another Python type than its reader expects."""
+
+
+class ReachError(PainterError):
+    """The arm cannot reach a pose that the job needs."""
+
+
+class CollisionError(PainterError):
+    """A planned motion comes closer to something than the clearance allows."""
+
+
+class MotionLimitError(PainterError):
+    """A planned motion exceeds a joint limit or does not hold its gun speed."""
+
+
+class FaultError(PainterError):
+    """The cycle ended in FAULT; the message is the latched cause."""

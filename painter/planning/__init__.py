@@ -1,0 +1,1 @@
+"""Spray planning: strokes, film, arm motion; geometry without systems."""

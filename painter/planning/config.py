@@ -1,0 +1,164 @@
+"""Settings of planning: tile, tip, raster, scan and motion; SI units.
+
+Plain mutable dataclasses, because Drake's `yaml_load_typed` fills them field by field.
+"""
+
+import dataclasses
+
+from perception.config import check_positive
+
+
+@dataclasses.dataclass(kw_only=True)
+class TileConfig:
+    """The piece of wall painted from one base placement, as the job expects it.
+
+    The arm base stands upright on the floor at W's origin, W x towards the wall.
+
+    Attributes:
+        width: Width, m; the tile is centred on the arm's base axis.
+        height: Height, m.
+        bottom: Height of its lower edge over the floor (W z = 0), m.
+        distance: Distance of the wall from the arm's base axis, m.
+    """
+
+    width: float = 2.0
+    height: float = 2.0
+    bottom: float = 0.2
+    distance: float = 1.05
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        check_positive(
+            "tile", width=self.width, height=self.height, distance=self.distance
+        )
+
+
+@dataclasses.dataclass(kw_only=True)
+class TipConfig:
+    """Spray tip: an elliptical double-beta fan.
+
+    Source: fan width and orifice: Graco tip guide (first digit x 5 cm at 30 cm); flow:
+    orifice equation for a 0.015 inch tip; `transfer_efficiency`, `fan_thickness`:
+    assumptions for flat walls, see docs of the gun model.
+
+    Attributes:
+        fan_width: Length of the fan's long axis at `fan_distance`, m.
+        fan_thickness: Length of its short axis at `fan_distance`, m.
+        fan_distance: Stand-off at which the fan has these sizes, m.
+        gamma: Exponent of a stroke's cross profile (1 - x²/a²)^gamma; beta1 - 1/2.
+        beta2: Exponent of the profile along the short axis.
+        flow: Volume flow at trigger 1, m³/s.
+        transfer_efficiency: Share of the flow that lands on the wall.
+        valve_delay: Time from trigger to flow, opening and closing, s.
+    """
+
+    fan_width: float = 0.25
+    fan_thickness: float = 0.05
+    fan_distance: float = 0.30
+    gamma: float = 2.0
+    beta2: float = 2.0
+    flow: float = 1.517e-5
+    transfer_efficiency: float = 0.65
+    valve_delay: float = 0.02
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        values = dataclasses.asdict(self)
+        delay = values.pop("valve_delay")
+        check_positive("gun.tip", **values)
+        if self.transfer_efficiency > 1.0:
+            raise ValueError(
+                "gun.tip.transfer_efficiency must be <= 1, got "
+                f"{self.transfer_efficiency!r}."
+            )
+        if not 0.0 <= delay < 0.5:
+            raise ValueError(f"gun.tip.valve_delay must be 0 to 0.5 s, got {delay!r}.")
+
+
+@dataclasses.dataclass(kw_only=True)
+class RasterConfig:
+    """Strokes of a tile.
+
+    Attributes:
+        speed: Gun speed on a stroke, m/s.
+        standoff: Distance from nozzle to wall along the spray axis, m.
+        overlap_pitch: Distance between strokes, m; 0 = the pitch of least variance for
+            the tip, 2 pi a / j(gamma + 1/2, 1), spread to fill the tile's width.
+        lead: Gun stays on this far beyond the edge of what is to be painted, m.
+        keepout_margin: Grown around what must stay clean, m.
+        min_stroke: Shorter strokes are dropped, m.
+        wall_share: The gun is on where at least this share of the fan's flow lands on
+            wall that is to be painted.
+    """
+
+    speed: float = 0.6
+    standoff: float = 0.30
+    overlap_pitch: float = 0.0
+    lead: float = 0.02
+    keepout_margin: float = 0.0
+    min_stroke: float = 0.03
+    wall_share: float = 0.5
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        check_positive("raster", speed=self.speed, standoff=self.standoff)
+        for name in ("overlap_pitch", "lead", "keepout_margin", "min_stroke"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ValueError(
+                    f"raster.{name} must be 0 to 1 m, got {getattr(self, name)!r}."
+                )
+        if not 0.0 < self.wall_share < 1.0:
+            raise ValueError(
+                f"raster.wall_share must be between 0 and 1, got {self.wall_share!r}."
+            )
+
+
+@dataclasses.dataclass(kw_only=True)
+class ScanConfig:
+    """First sight of the wall and the zig-zag scan.
+
+    Attributes:
+        look_distance: Camera to expected wall at first sight, m.
+        look_time: How long the arm holds still for first sight, s.
+        distance: Camera to wall during the scan, m.
+        speed: Camera speed on the rows, m/s.
+        overlap: Share of a picture's height that neighbouring rows share.
+        margin: How far beyond the tile's edge the pictures reach, m.
+    """
+
+    look_distance: float = 0.8
+    look_time: float = 0.6
+    distance: float = 0.70
+    speed: float = 0.25
+    overlap: float = 0.3
+    margin: float = 0.05
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        check_positive("scan", **dataclasses.asdict(self))
+        if self.overlap >= 0.9:
+            raise ValueError(f"scan.overlap must be < 0.9, got {self.overlap!r}.")
+
+
+@dataclasses.dataclass(kw_only=True)
+class MotionConfig:
+    """Arm motion.
+
+    Attributes:
+        limit_share: Share of the joints' velocity and acceleration limits that plans
+            may use, so that tracking has something in hand.
+        clearance: Least distance of the arm and gun from everything else, m.
+        sample_period: Spacing of a planned motion's samples, s.
+    """
+
+    limit_share: float = 0.9
+    clearance: float = 0.04
+    sample_period: float = 0.01
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        check_positive("motion", **dataclasses.asdict(self))
+        if self.limit_share > 1.0:
+            raise ValueError(
+                f"motion.limit_share must be <= 1, got {self.limit_share!r}."
+            )

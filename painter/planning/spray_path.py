@@ -1,0 +1,87 @@
+"""Frozen values of planning: strokes, arm motions and the paint program."""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.trajectories import PiecewisePolynomial
+
+from perception.values import FloatArray, FrozenValue
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke(FrozenValue):
+    """One straight pass of the gun at constant speed with the spray on.
+
+    Attributes:
+        start_T: (2,) m, in T's x and y: where the spray axis meets the wall as the gun
+            opens.
+        end_T: (2,) m: where it closes.
+        speed: Speed of that point along the wall, m/s.
+        kind: "body" for the raster; later "cut_in", "touch_up".
+        column: Number of the raster line it lies on, from the left.
+    """
+
+    start_T: FloatArray
+    end_T: FloatArray
+    speed: float
+    kind: str
+    column: int
+
+    @property
+    def length(self) -> float:
+        """Length on the wall, m."""
+        return float(np.linalg.norm(self.end_T - self.start_T))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(FrozenValue):
+    """An arm motion from rest to rest, with the times at which the gun is open.
+
+    Attributes:
+        time: (n,) s, strictly increasing, from 0.
+        q: (n, 5) rad.
+        v: (n, 5) rad/s, zero in the first and last row.
+        spray_on: (m, 2) s, [open, close) in the motion's own time as the trigger is
+            commanded (valve delay already taken off), in order, not overlapping.
+    """
+
+    time: FloatArray
+    q: FloatArray
+    v: FloatArray
+    spray_on: FloatArray
+
+    @property
+    def duration(self) -> float:
+        """Time from start to end, s."""
+        return float(self.time[-1])
+
+    @functools.cached_property
+    def trajectory(self) -> PiecewisePolynomial:
+        """Cubic Hermite spline through the samples, (5,) rad over s."""
+        return PiecewisePolynomial.CubicHermite(self.time, self.q.T, self.v.T)
+
+    def trigger(self, time: float) -> float:
+        """Returns 1.0 while the gun is commanded open at `time` (s), else 0.0."""
+        index = int(np.searchsorted(self.spray_on[:, 0], time, side="right")) - 1
+        return float(index >= 0 and time < self.spray_on[index, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class PaintProgram(FrozenValue):
+    """What the robot is to do with one tile, ready to be approved and executed.
+
+    Attributes:
+        strokes: In order of execution.
+        motion: Approach, strokes, turns and transits as one motion.
+        X_WT: Tile frame T in W, as segmented.
+        standoff: Nozzle to wall, m.
+        nominal_thickness: Film that the raster aims at, m (wet).
+    """
+
+    strokes: tuple[Stroke, ...]
+    motion: Motion
+    X_WT: RigidTransform
+    standoff: float
+    nominal_thickness: float

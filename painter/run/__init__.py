@@ -1,0 +1,1 @@
+"""Run folders: what a run leaves, its figures and its report page."""

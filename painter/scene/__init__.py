@@ -1,0 +1,1 @@
+"""Scene descriptions: geometry for the simulator, truth for the figures."""

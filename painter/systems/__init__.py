@@ -1,0 +1,1 @@
+"""Drake LeafSystems of the brain and of the simulated body."""

@@ -1,0 +1,110 @@
+"""Frozen values that the brain's systems hand to one another."""
+
+import enum
+from dataclasses import dataclass, field
+from typing import Any
+
+from painter.planning.spray_path import Motion
+from perception.values import FrozenValue
+
+
+class Phase(enum.Enum):
+    """Phases of the paint cycle, in their order; the last three come from any."""
+
+    HOME = "HOME"
+    LOOK = "LOOK"
+    SCAN = "SCAN"
+    SEGMENT = "SEGMENT"
+    PLAN = "PLAN"
+    REVIEW = "REVIEW"
+    PAINT = "PAINT"
+    RETRACT = "RETRACT"
+    DONE = "DONE"
+    PAUSED = "PAUSED"
+    FAULT = "FAULT"
+    ABORTED = "ABORTED"
+
+
+@dataclass(frozen=True, eq=False)
+class DriveStatus(FrozenValue):
+    """One drive. `following_error` in rad; `fault_code` 0 = none (CiA 402, 603Fh)."""
+
+    state: str = "OPERATION ENABLED"
+    fault_code: int = 0
+    following_error: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ArmStatus(FrozenValue):
+    """State of the arm's five drives, base yaw first."""
+
+    drives: tuple[DriveStatus, ...] = field(default_factory=lambda: (DriveStatus(),) * 5)
+
+    @property
+    def fault(self) -> str | None:
+        """Names the first drive that is not operational, or None."""
+        for number, drive in enumerate(self.drives, start=1):
+            if drive.fault_code or drive.state != "OPERATION ENABLED":
+                code = f"0x{drive.fault_code:04X}"
+                return f"drive {number}: {drive.state}, fault code {code}"
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class StageRequest(FrozenValue):
+    """Asks a stage for work; a stage answers each `number` once.
+
+    Attributes:
+        number: Counts up over the cycle; 0 = nothing asked yet.
+        stage: Name of the stage that is asked ("wall_finder", "wall_segmenter", ...).
+        goal: What is wanted of it, where it can do more than one thing.
+    """
+
+    number: int = 0
+    stage: str = ""
+    goal: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class StageResult(FrozenValue):
+    """Answer of a stage to the request of the same number.
+
+    Attributes:
+        number: Of the request; 0 = nothing done yet.
+        value: The result, or None where it failed.
+        error: One line saying why it failed, or None.
+        compute_time: Wall-clock time of the work, s; a log entry, never a decision.
+    """
+
+    number: int = 0
+    value: Any = None
+    error: str | None = None
+    compute_time: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MotionCommand(FrozenValue):
+    """What the path follower is to do.
+
+    Attributes:
+        number: Counts up with every new motion; 0 = hold where the arm is.
+        motion: Motion to follow from its beginning once `number` is new.
+        rate: Wanted rate of time along the motion: 1 = as planned, 0 = stand still.
+        spray: False keeps the gun closed, whatever the motion says.
+    """
+
+    number: int = 0
+    motion: Motion | None = None
+    rate: float = 1.0
+    spray: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorCommand(FrozenValue):
+    """A word of the operator: "approve", "pause", "resume", "abort".
+
+    `number` counts up with every command; 0 = none yet.
+    """
+
+    number: int = 0
+    word: str = ""

@@ -1,0 +1,1 @@
+"""Perception of a wall: depth images and clouds in, wall segmentation out."""

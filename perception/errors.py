@@ -1,0 +1,17 @@
+"""Errors of perception; each message names the file or quantity, value and bound."""
+
+
+class PerceptionError(Exception):
+    """Perception cannot give a right answer; `exit_code` is the command line's."""
+
+    exit_code = 1
+
+
+class CloudReadError(PerceptionError):
+    """A cloud or depth file is missing, truncated, empty or of an unknown form."""
+
+    exit_code = 2
+
+
+class NoWallError(PerceptionError):
+    """There is no wall where one is expected, or not enough of one."""

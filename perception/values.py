@@ -1,0 +1,103 @@
+"""Frozen values that perception produces and that travel on Drake ports."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.math import RigidTransform
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
+
+
+class FrozenValue:
+    """Base of frozen dataclasses that travel on ports or live in a Context.
+
+    Drake deep-copies the Python state of a system around its unrestricted updates and
+    passes references along ports, so a value never changes: its arrays are made
+    read-only and a copy is the value itself.
+    """
+
+    def __post_init__(self) -> None:
+        """Makes every array field read-only."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Returns the value itself: it cannot change."""
+        return self
+
+    def replace(self, **changes: Any) -> Self:
+        """Returns a copy with some fields exchanged."""
+        return dataclasses.replace(self, **changes)  # type: ignore[type-var]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMap(FrozenValue):
+    """Fused surface points, one a voxel, as the map accumulator gives them out.
+
+    Attributes:
+        p_WQs: (3, N) float64, m, in W.
+        normals_W: (3, N) float32, unit, in W, towards the camera that saw the point.
+        counts: (N,) int64, depth pixels fused into the point.
+        variances: (N,) float32, m², of the depth along the map's z axis.
+        frames: Depth images fused so far.
+    """
+
+    p_WQs: FloatArray
+    normals_W: npt.NDArray[np.float32]
+    counts: IntArray
+    variances: npt.NDArray[np.float32]
+    frames: int
+
+    @classmethod
+    def empty(cls) -> Self:
+        """Makes a map of nothing."""
+        return cls(
+            p_WQs=np.zeros((3, 0)),
+            normals_W=np.zeros((3, 0), dtype=np.float32),
+            counts=np.zeros(0, dtype=np.int64),
+            variances=np.zeros(0, dtype=np.float32),
+            frames=0,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Wall(FrozenValue):
+    """A wall found in a cloud, with the tile laid on it.
+
+    Attributes:
+        X_WT: Tile frame T in W: origin at the tile's lower-left corner as seen by the
+            robot, x right, y up, z out of the wall towards the robot.
+        rms: Root mean square distance of the inliers from the plane, m.
+        inlier_count: Points within the distance threshold of the plane.
+        inlier_share: The same as a share of all points looked at.
+    """
+
+    X_WT: RigidTransform
+    rms: float
+    inlier_count: int
+    inlier_share: float
+
+
+@dataclass(frozen=True, eq=False)
+class WallSegmentation(FrozenValue):
+    """Labelled grid over the tile; row 0 is the bottom row, column 0 the left one.
+
+    Attributes:
+        labels: (ny, nx) uint16; 0 = nothing seen, 1 = largest region, 2 = next ...
+        depth: (ny, nx) float32, m along T z; NaN = nothing seen.
+        wall_mask: (ny, nx) bool; True = wall, to be painted.
+        X_WT: Tile frame T in W (see `Wall`).
+        cell: Edge of a cell, m.
+    """
+
+    labels: npt.NDArray[np.uint16]
+    depth: npt.NDArray[np.float32]
+    wall_mask: BoolArray
+    X_WT: RigidTransform
+    cell: float
