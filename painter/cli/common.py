@@ -1,0 +1,103 @@
+"""What the commands share: options, results, progress and output folders."""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from painter.errors import InputError
+
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set a scenario value in SI units, e.g. raster.speed=0.5; repeatable.",
+    ),
+]
+OutOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder to write the result to.")
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print the result as JSON alone on stdout.")
+]
+
+
+def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
+    """Prints what a command found.
+
+    Args:
+        result: Names and JSON values; numbers in SI units or with the unit in the name.
+        as_json: One JSON object, else a line for each name.
+    """
+    if as_json:
+        typer.echo(json.dumps(result, indent=2, allow_nan=False))
+        return
+    width = max(map(len, result), default=0)
+    for name, value in result.items():
+        text = f"{value:.4g}" if isinstance(value, float) else str(value)
+        typer.echo(f"{name:<{width}}  {text}")
+
+
+@contextmanager
+def progress(description: str) -> Iterator[Callable[[float, str], None]]:
+    """Shows a progress bar on stderr while the block runs.
+
+    Args:
+        description: What is being done.
+
+    Yields:
+        A function `show(share, text)`: the share done, 0 to 1, and what is done now.
+    """
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[text]}"),
+    )
+    # On anything but a terminal a bar is noise in a log.
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(description, total=1.0, text="")
+        yield lambda share, text: bar.update(task, completed=share, text=text)
+
+
+@contextmanager
+def output_folder(folder: Path) -> Iterator[Path]:
+    """Gives a folder to write to that takes its name only when all went well.
+
+    The block writes to a hidden folder beside `folder`. When it ends without an
+    exception, the files move to `folder`, where they replace files of the same names;
+    otherwise they are removed and `folder` is as it was.
+
+    Args:
+        folder: Where the result is to be; parents are made.
+
+    Yields:
+        The folder to write to.
+
+    Raises:
+        InputError: `folder` is a file or cannot be made.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {folder}: there is a file of that name.")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+    except OSError as error:
+        raise InputError(f"--out {folder}: {error.strerror}.") from error
+    try:
+        yield draft
+        folder.mkdir(exist_ok=True)
+        for path in sorted(draft.iterdir()):
+            path.replace(folder / path.name)
+    finally:
+        shutil.rmtree(draft)

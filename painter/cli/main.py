@@ -1,0 +1,134 @@
+"""The `painter` command: finds the subcommand, maps errors to exit codes."""
+
+import importlib
+import inspect
+import logging
+import re
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from painter.errors import PainterError
+from perception.errors import PerceptionError
+
+# Every command is the function of its name in the module of its name beside this one.
+COMMANDS = {
+    "simulate": "Simulate the whole paint cycle in Drake.",
+    "segment": "Segment a recorded cloud or depth image into wall and rest.",
+    "plan": "Plan the paint program of a segmented wall.",
+    "report": "Rebuild the report page of a run.",
+}
+
+EXIT_DONE = 0
+EXIT_FAILED = 1
+EXIT_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+
+class LazyGroup(TyperGroup):
+    """Imports a command's module only when that command is called.
+
+    So `painter --help` does not wait for Drake and Open3D, and a command whose
+    dependencies are missing does not take the others with it.
+    """
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+        """Returns name, real command and remaining words; fails for an unknown name."""
+        name, _, rest = super().resolve_command(ctx, args)
+        module = importlib.import_module(f"painter.cli.{name}")
+        function = getattr(module, str(name))
+        # The help is the docstring without what only a reader of the code needs.
+        summary = re.split(r"\n\s*\n *(?:Args|Returns|Raises):", function.__doc__)[0]
+        single = typer.Typer(add_completion=False, rich_markup_mode=None)
+        single.command(name, help=inspect.cleandoc(summary))(function)
+        return name, get_command(single), rest
+
+
+app = typer.Typer(
+    cls=LazyGroup,
+    name="painter",
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _placeholder() -> None:
+    """Stands for a command in the list of commands; `LazyGroup` swaps it."""
+
+
+for _name, _summary in COMMANDS.items():
+    app.command(_name, help=_summary)(_placeholder)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"painter {version('painter')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Log what is done to stderr.")
+    ] = False,
+    show_version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            callback=_print_version,
+            is_eager=True,
+            help="Print the version and exit.",
+        ),
+    ] = False,
+) -> None:
+    """Look at a wall, work out what to paint, and paint it.
+
+    Exit status: 0 done, 1 failed or aborted job, 2 wrong use or unusable input.
+    """
+    logging.basicConfig(
+        level=logging.INFO if verbose else logging.WARNING,
+        format="%(name)s: %(levelname)s: %(message)s",
+    )
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Runs the command line.
+
+    Args:
+        arguments: The words after `painter`; none asks for help.
+
+    Returns:
+        The exit status. Errors of Painter's own and wrong use are one line on stderr;
+        any other exception is a bug and passes through.
+    """
+    try:
+        words = list(arguments) or ["--help"]
+        code = app(words, prog_name="painter", standalone_mode=False)
+    except typer.TyperException as error:
+        _print_error(error.format_message())
+        return EXIT_INPUT
+    except (PainterError, PerceptionError) as error:
+        _print_error(str(error))
+        return error.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        code = EXIT_INTERRUPTED
+    if code == EXIT_INTERRUPTED:
+        _print_error("interrupted.")
+    return code if isinstance(code, int) else EXIT_DONE
+
+
+def main() -> None:
+    """Entry point of the `painter` program."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def _print_error(message: str) -> None:
+    line = " ".join(message.split())
+    label = typer.style("error:", fg=typer.colors.RED, bold=True)
+    typer.echo(f"painter: {label} {line}", err=True)
