@@ -67,6 +67,11 @@ class Motion(FrozenValue):
         index = int(np.searchsorted(self.spray_on[:, 0], time, side="right")) - 1
         return float(index >= 0 and time < self.spray_on[index, 1])
 
+    def sprays_within(self, start: float, end: float) -> bool:
+        """Returns whether the gun is to be open at any time in [start, end] (s)."""
+        opens, closes = self.spray_on[:, 0], self.spray_on[:, 1]
+        return bool(np.any((opens < end) & (closes > start)))
+
 
 @dataclass(frozen=True, eq=False)
 class PaintProgram(FrozenValue):

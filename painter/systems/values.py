@@ -38,7 +38,9 @@ class DriveStatus(FrozenValue):
 class ArmStatus(FrozenValue):
     """State of the arm's five drives, base yaw first."""
 
-    drives: tuple[DriveStatus, ...] = field(default_factory=lambda: (DriveStatus(),) * 5)
+    drives: tuple[DriveStatus, ...] = field(
+        default_factory=lambda: (DriveStatus(),) * 5
+    )
 
     @property
     def fault(self) -> str | None:
@@ -108,3 +110,44 @@ class OperatorCommand(FrozenValue):
 
     number: int = 0
     word: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class FollowerStatus(FrozenValue):
+    """Where the path follower is.
+
+    Attributes:
+        number: Of the motion being followed; 0 = none yet.
+        position: Path time, s.
+        duration: Of the whole motion, s.
+        rate: Path time per time: 1 = as planned, 0 = standing.
+        spraying: Whether the motion has its gun open there.
+    """
+
+    number: int = 0
+    position: float = 0.0
+    duration: float = 0.0
+    rate: float = 0.0
+    spraying: bool = False
+
+    @property
+    def done(self) -> bool:
+        """True once the motion has come to its end."""
+        return self.number > 0 and self.position >= self.duration
+
+
+@dataclass(frozen=True, eq=False)
+class CycleStatus(FrozenValue):
+    """What the paint cycle is doing.
+
+    Attributes:
+        phase: Present phase.
+        cause: Why the cycle is in FAULT or ABORTED, else "".
+        finished: True once nothing more will happen.
+        events: What happened so far: (time s, name, data) each.
+    """
+
+    phase: Phase = Phase.HOME
+    cause: str = ""
+    finished: bool = False
+    events: tuple[tuple[float, str, dict[str, Any]], ...] = ()

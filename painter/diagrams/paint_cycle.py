@@ -1,0 +1,204 @@
+"""The brain, and the whole paint cycle: a station with the brain."""
+
+import dataclasses
+
+from pydrake.geometry import Meshcat
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from painter.config import Scenario
+from painter.diagrams.arm_model import (
+    GetArmKinematics,
+    GetArmLimits,
+    MakeArmPlant,
+    MakeCollisionChecker,
+)
+from painter.diagrams.station import CHEAT_PREFIX, MakeStation
+from painter.planning.tile import nominal_tile_pose
+from painter.systems.camera_pose import CameraPose
+from painter.systems.map_accumulator import MapAccumulator
+from painter.systems.motion_planner import MotionPlanner
+from painter.systems.paint_cycle import STAGES, PaintCycle
+from painter.systems.path_follower import PathFollower
+from painter.systems.spray_path_planner import SprayPathPlanner
+from painter.systems.wall_finder import WallFinder
+from painter.systems.wall_segmenter import WallSegmenter
+
+# Inputs and outputs of the brain that meet the station's ports of the same name.
+STATION_TO_BRAIN = (
+    "arm.state_estimated",
+    "arm.status",
+    "wall_camera.depth_image",
+    "wall_camera.image_time",
+)
+BRAIN_TO_STATION = ("arm.desired_state", "gun.trigger")
+
+
+def MakeBrain(scenario: Scenario) -> Diagram:
+    """Makes the brain: all that looks, decides and plans, the same on every body.
+
+    Args:
+        scenario: The job.
+
+    Returns:
+        A diagram with the inputs STATION_TO_BRAIN and `operator` (OperatorCommand, may
+        be left unconnected), the outputs BRAIN_TO_STATION, and for whoever watches:
+        `cycle_status`, `surface_map`, `wall`, `segmentation`, `program`.
+    """
+    builder = DiagramBuilder()
+    plant = MakeArmPlant(scenario.directives)
+    kinematics, limits = GetArmKinematics(plant), GetArmLimits(plant)
+    X_WT_expected = nominal_tile_pose(scenario.tile)
+    period = scenario.cycle.period
+    add = builder.AddNamedSystem
+    camera_pose = add("camera_pose", CameraPose(kinematics=kinematics))
+    accumulator = add(
+        "map_accumulator",
+        MapAccumulator(
+            config=scenario.map,
+            stereo=scenario.wall_camera.stereo,
+            tile=scenario.tile,
+            X_WT_expected=X_WT_expected,
+            period=1.0 / scenario.wall_camera.rate,
+        ),
+    )
+    finder = add(
+        "wall_finder",
+        WallFinder(
+            X_WT_expected=X_WT_expected,
+            config=scenario.segmentation,
+            seed=scenario.random_seed,
+            period=period,
+        ),
+    )
+    segmenter = add(
+        "wall_segmenter",
+        WallSegmenter(
+            width=scenario.tile.width,
+            height=scenario.tile.height,
+            config=scenario.segmentation,
+            seed=scenario.random_seed,
+            period=period,
+        ),
+    )
+    planning = {
+        "kinematics": kinematics,
+        "limits": limits,
+        "checker": MakeCollisionChecker(
+            scenario.directives, clearance=scenario.motion.clearance
+        ),
+        "tile": scenario.tile,
+        "motion": scenario.motion,
+        "period": period,
+    }
+    mover = add("motion_planner", MotionPlanner(scan=scenario.scan, **planning))
+    planner = add(
+        "spray_path_planner",
+        SprayPathPlanner(tip=scenario.gun.tip, raster=scenario.raster, **planning),
+    )
+    follower = add("path_follower", PathFollower(period=period))
+    cycle = add(
+        "paint_cycle",
+        PaintCycle(
+            unattended=scenario.cycle.unattended,
+            period=period,
+            look_time=scenario.scan.look_time,
+            time_limit=scenario.cycle.time_limit,
+        ),
+    )
+    stages = dict(zip(STAGES, (mover, finder, segmenter, planner), strict=True))
+    # Pictures become the map.
+    connect = builder.Connect
+    connect(camera_pose.GetOutputPort("X_WC"), accumulator.GetInputPort("X_WC"))
+    connect(cycle.GetOutputPort("camera_enabled"), accumulator.GetInputPort("enabled"))
+    wall_port = finder.GetOutputPort("result")
+    for system in (accumulator, segmenter, mover):
+        connect(wall_port, system.GetInputPort("wall"))
+    for system in (finder, segmenter):
+        connect(
+            accumulator.GetOutputPort("surface_map"), system.GetInputPort("surface_map")
+        )
+    # The map becomes a program.
+    connect(segmenter.GetOutputPort("result"), planner.GetInputPort("segmentation"))
+    for name, stage in stages.items():
+        connect(cycle.GetOutputPort("request"), stage.GetInputPort("request"))
+        connect(stage.GetOutputPort("result"), cycle.GetInputPort(name))
+    # Plans begin where the arm was last told to be, not at its tracking error.
+    desired_port = follower.GetOutputPort("desired_state")
+    for system in (mover, planner):
+        connect(desired_port, system.GetInputPort("state"))
+    connect(
+        cycle.GetOutputPort("motion_command"), follower.GetInputPort("motion_command")
+    )
+    connect(follower.GetOutputPort("status"), cycle.GetInputPort("follower_status"))
+    # To and from the station.
+    for name, ports in {
+        "arm.state_estimated": (
+            camera_pose.GetInputPort("state"),
+            follower.GetInputPort("state"),
+        ),
+        "arm.status": (cycle.GetInputPort("arm_status"),),
+        "wall_camera.depth_image": (accumulator.GetInputPort("depth_image"),),
+        "wall_camera.image_time": (
+            accumulator.GetInputPort("image_time"),
+            camera_pose.GetInputPort("image_time"),
+        ),
+    }.items():
+        builder.ExportInput(ports[0], name)
+        for port in ports[1:]:
+            builder.ConnectInput(name, port)
+    builder.ExportInput(cycle.GetInputPort("operator"), "operator")
+    builder.ExportOutput(desired_port, "arm.desired_state")
+    builder.ExportOutput(follower.GetOutputPort("trigger"), "gun.trigger")
+    builder.ExportOutput(cycle.GetOutputPort("cycle_status"), "cycle_status")
+    builder.ExportOutput(accumulator.GetOutputPort("surface_map"), "surface_map")
+    builder.ExportOutput(wall_port, "wall")
+    builder.ExportOutput(segmenter.GetOutputPort("result"), "segmentation")
+    builder.ExportOutput(planner.GetOutputPort("result"), "program")
+    diagram = builder.Build()
+    diagram.set_name("brain")
+    return diagram
+
+
+@dataclasses.dataclass(frozen=True)
+class PaintCycleDiagram:
+    """The whole cycle.
+
+    Attributes:
+        diagram: Station and brain, connected; the brain's ports for those who watch
+            and the station's `cheat.*` are exported under their own names.
+        station: The station in it.
+        brain: The brain in it.
+    """
+
+    diagram: Diagram
+    station: Diagram
+    brain: Diagram
+
+
+def MakePaintCycle(
+    scenario: Scenario, *, meshcat: Meshcat | None = None
+) -> PaintCycleDiagram:
+    """Makes the whole paint cycle of a scenario.
+
+    Args:
+        scenario: The job.
+        meshcat: Where to show it, or None.
+    """
+    builder = DiagramBuilder()
+    station = builder.AddSystem(MakeStation(scenario, meshcat=meshcat))
+    brain = builder.AddSystem(MakeBrain(scenario))
+    for name in STATION_TO_BRAIN:
+        builder.Connect(station.GetOutputPort(name), brain.GetInputPort(name))
+    for name in BRAIN_TO_STATION:
+        builder.Connect(brain.GetOutputPort(name), station.GetInputPort(name))
+    builder.ExportInput(brain.GetInputPort("operator"), "operator")
+    for index in range(station.num_output_ports()):
+        port = station.get_output_port(index)
+        if port.get_name().startswith(CHEAT_PREFIX):
+            builder.ExportOutput(port, port.get_name())
+    for index in range(brain.num_output_ports()):
+        port = brain.get_output_port(index)
+        builder.ExportOutput(port, port.get_name())
+    diagram = builder.Build()
+    diagram.set_name("paint_cycle")
+    return PaintCycleDiagram(diagram=diagram, station=station, brain=brain)

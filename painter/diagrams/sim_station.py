@@ -1,0 +1,251 @@
+"""The simulated body: plant, drives, depth camera and paint film."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    MakeRenderEngineVtk,
+    Meshcat,
+    MeshcatVisualizer,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
+from pydrake.systems.controllers import InverseDynamicsController
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import (
+    Demultiplexer,
+    DiscreteDerivative,
+    SharedPointerSystem,
+)
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from painter.config import Scenario
+from painter.diagrams.arm_model import (
+    ROBOT_MODELS,
+    AddRobot,
+    GetArmKinematics,
+    MakeArmPlant,
+)
+from painter.planning.tile import nominal_tile_pose
+from painter.scene.load import load_scene
+from painter.scene.sdf import scene_sdf, wall_pose
+from painter.scene.surface import height_field
+from painter.systems.clearance_monitor import ClearanceMonitor
+from painter.systems.gun_pose import GunPose
+from painter.systems.joint_encoder import JointEncoder
+from painter.systems.paint_film import PaintFilm
+from painter.systems.simulated_drives import SimulatedDrives
+from painter.systems.stereo_camera import StereoCamera
+
+NQ = 5
+# Renderers: what light sees, and the same with panes of glass opaque.
+SCENE_RENDERER = "scene"
+GLASS_RENDERER = "with_glass"
+FILM_CELL = 0.01
+FILM_MARGIN = 0.35
+# The drives differentiate their velocity set-point over this time for feed-forward.
+FEED_FORWARD_PERIOD = 0.004
+
+
+def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Diagram:
+    """Makes the simulated station of a scenario.
+
+    The arm stands at its nominal pose in W; the errors of the base placement move the
+    scene instead, which comes to the same for the robot.
+
+    Args:
+        scenario: Robot, scene, camera and gun.
+        meshcat: Where to show robot and scene, or None.
+
+    Returns:
+        A diagram with the ports of `painter.diagrams.station` and these `cheat.*`
+        outputs: `state` (10,) true q, v; `X_WG` true gun pose; `clearance` (1,) m;
+        `film` FilmState; `query_object`.
+    """
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlant(scenario.plant_config, builder)
+    AddRobot(Parser(plant), scenario.directives)
+    _AddScene(plant, scenario)
+    plant.Finalize()
+    arm = plant.GetModelInstanceByName("arm")
+    plant.SetDefaultPositions(arm, np.deg2rad(scenario.motion.home_deg))
+    _AddDrives(builder, plant, scenario)
+    _AddWallCamera(builder, plant, scene_graph, scenario)
+    _AddGun(builder, plant, scenario)
+    monitor = builder.AddNamedSystem(
+        "clearance_monitor", ClearanceMonitor(robot=_RobotGeometries(plant))
+    )
+    query_port = scene_graph.get_query_output_port()
+    builder.Connect(query_port, monitor.GetInputPort("query_object"))
+    builder.ExportOutput(monitor.GetOutputPort("clearance"), "cheat.clearance")
+    builder.ExportOutput(query_port, "cheat.query_object")
+    builder.ExportOutput(plant.get_state_output_port(arm), "cheat.state")
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    diagram = builder.Build()
+    diagram.set_name("station")
+    return diagram
+
+
+def _AddScene(plant: MultibodyPlant, scenario: Scenario) -> None:
+    scene = load_scene(scenario.scene, scenario.random_seed)
+    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+    parser = Parser(plant)
+    # The parser reads a textured wall's mesh and picture into memory.
+    with tempfile.TemporaryDirectory() as folder:
+        sdf = scene_sdf(scene, Path(folder))
+        parser.AddModelsFromString(sdf, "sdf")
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("scene"), X_WS)
+
+
+def _RobotGeometries(plant: MultibodyPlant) -> frozenset:
+    models = [plant.GetModelInstanceByName(name) for name in ROBOT_MODELS]
+    return frozenset(
+        geometry
+        for model in models
+        for body in plant.GetBodyIndices(model)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
+    )
+
+
+def _AddDrives(
+    builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario
+) -> None:
+    """Adds encoders and the joint loops: PID with inverse-dynamics feed-forward."""
+    arm = plant.GetModelInstanceByName("arm")
+    model = builder.AddNamedSystem(
+        "controller_plant", SharedPointerSystem(MakeArmPlant(scenario.directives))
+    ).get()
+    gains = scenario.arm.gains
+    controller = builder.AddNamedSystem(
+        "joint_pid",
+        InverseDynamicsController(
+            robot=model,
+            kp=np.full(NQ, gains.kp),
+            ki=np.full(NQ, gains.ki),
+            kd=np.full(NQ, gains.kd),
+            has_reference_acceleration=True,
+        ),
+    )
+    encoder = builder.AddNamedSystem(
+        "joint_encoder", JointEncoder(bits=scenario.arm.encoder_bits)
+    )
+    faults = [(fault.time, fault.joint, fault.code) for fault in scenario.arm.faults]
+    drives = builder.AddNamedSystem("drives", SimulatedDrives(faults=faults))
+    split = builder.AddNamedSystem("desired_split", Demultiplexer(2 * NQ, NQ))
+    acceleration = builder.AddNamedSystem(
+        "feed_forward", DiscreteDerivative(NQ, FEED_FORWARD_PERIOD)
+    )
+    builder.Connect(plant.get_state_output_port(arm), encoder.GetInputPort("state"))
+    estimated = encoder.GetOutputPort("state_estimated")
+    builder.Connect(estimated, controller.get_input_port_estimated_state())
+    builder.Connect(estimated, drives.GetInputPort("state_estimated"))
+    builder.Connect(split.get_output_port(1), acceleration.get_input_port())
+    builder.Connect(
+        acceleration.get_output_port(),
+        controller.get_input_port_desired_acceleration(),
+    )
+    builder.Connect(
+        controller.get_output_port_control(), plant.get_actuation_input_port(arm)
+    )
+    builder.ExportInput(controller.get_input_port_desired_state(), "arm.desired_state")
+    builder.ConnectInput("arm.desired_state", split.get_input_port())
+    builder.ConnectInput("arm.desired_state", drives.GetInputPort("desired_state"))
+    builder.ExportOutput(estimated, "arm.state_estimated")
+    builder.ExportOutput(drives.GetOutputPort("status"), "arm.status")
+
+
+def _AddWallCamera(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    scenario: Scenario,
+) -> None:
+    """Adds the renderers, the ideal cameras and the stereo camera's errors."""
+    config = scenario.wall_camera
+    for name in (SCENE_RENDERER, GLASS_RENDERER):
+        engine = MakeRenderEngineVtk(RenderEngineVtkParams(backend="EGL"))
+        scene_graph.AddRenderer(name, engine)
+    mount = plant.GetFrameByName("camera_depth")
+    X_error = RigidTransform(
+        RollPitchYaw(np.deg2rad(config.mount_error_deg)), config.mount_error_m
+    )
+    X_BC = mount.GetFixedPoseInBodyFrame() @ X_error
+    frame_id = plant.GetBodyFrameIdOrThrow(mount.body().index())
+
+    def core(renderer: str, width: int, height: int) -> RenderCameraCore:
+        focal = 0.5 * width / np.tan(0.5 * np.deg2rad(config.stereo.hfov_deg))
+        info = CameraInfo(
+            width, height, focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5
+        )
+        return RenderCameraCore(
+            renderer, info, ClippingRange(0.02, 20.0), RigidTransform()
+        )
+
+    def sensor(renderer: str) -> RgbdSensor:
+        color = ColorRenderCamera(
+            core(GLASS_RENDERER, config.color_width, config.color_height)
+        )
+        depth = DepthRenderCamera(
+            core(renderer, config.stereo.width, config.stereo.height),
+            DepthRange(0.05, 15.0),
+        )
+        return RgbdSensor(frame_id, X_BC, color, depth)
+
+    stereo = builder.AddNamedSystem(
+        "stereo_camera",
+        StereoCamera(
+            config=config.stereo, seed=scenario.random_seed, period=1.0 / config.rate
+        ),
+    )
+    query_port = scene_graph.get_query_output_port()
+    for renderer, port in (
+        (SCENE_RENDERER, "ideal_depth"),
+        (GLASS_RENDERER, "ideal_depth_with_glass"),
+    ):
+        camera = builder.AddNamedSystem(f"camera_{renderer}", sensor(renderer))
+        builder.Connect(query_port, camera.query_object_input_port())
+        builder.Connect(camera.depth_image_32F_output_port(), stereo.GetInputPort(port))
+    builder.ExportOutput(camera.color_image_output_port(), "wall_camera.color_image")
+    for port in ("depth_image", "image_time"):
+        builder.ExportOutput(stereo.GetOutputPort(port), f"wall_camera.{port}")
+
+
+def _AddGun(builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario) -> None:
+    """Adds the paint film on the scene's true surface."""
+    arm = plant.GetModelInstanceByName("arm")
+    scene = load_scene(scenario.scene, scenario.random_seed)
+    surface = height_field(
+        scene,
+        cell=FILM_CELL,
+        margin=FILM_MARGIN,
+        width=scenario.tile.width,
+        height=scenario.tile.height,
+    )
+    film = builder.AddNamedSystem(
+        "paint_film",
+        PaintFilm(
+            height=surface.height,
+            cell=surface.cell,
+            origin=surface.origin,
+            X_WS=wall_pose(scene, nominal_tile_pose(scenario.tile)),
+            tip=scenario.gun.tip,
+        ),
+    )
+    gun = builder.AddNamedSystem(
+        "gun_pose", GunPose(kinematics=GetArmKinematics(plant))
+    )
+    builder.Connect(plant.get_state_output_port(arm), gun.GetInputPort("state"))
+    builder.Connect(gun.GetOutputPort("X_WG"), film.GetInputPort("X_WG"))
+    builder.ExportInput(film.GetInputPort("trigger"), "gun.trigger")
+    builder.ExportOutput(gun.GetOutputPort("X_WG"), "cheat.X_WG")
+    builder.ExportOutput(film.GetOutputPort("film"), "cheat.film")

@@ -1,0 +1,52 @@
+"""How close the robot comes to anything else; simulation only."""
+
+from pydrake.common.value import Value
+from pydrake.geometry import GeometryId, QueryObject
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+
+class ClearanceMonitor(LeafSystem):
+    """Measures the least distance between the robot and everything else.
+
+    .. pydrake_system::
+
+        name: ClearanceMonitor
+        input_ports:
+        - query_object
+        output_ports:
+        - clearance
+
+    Ports:
+        query_object: QueryObject of the scene graph.
+        clearance: (1,) m; negative = penetration; `horizon` = nothing nearer than that.
+    """
+
+    def __init__(self, *, robot: frozenset[GeometryId], horizon: float = 0.3) -> None:
+        """Creates the monitor.
+
+        Args:
+            robot: Collision geometries of the robot's moving bodies.
+            horizon: Distances beyond this are not looked at, m.
+
+        Raises:
+            ValueError: The robot has no geometry or the horizon is not positive.
+        """
+        super().__init__()
+        if not robot:
+            raise ValueError("robot must name at least one geometry.")
+        if not horizon > 0.0:
+            raise ValueError(f"horizon must be > 0 m, got {horizon!r}.")
+        self._robot = robot
+        self._horizon = horizon
+        # Inputs.
+        self._query_port = self.DeclareAbstractInputPort(
+            "query_object", Value(QueryObject())
+        )
+        # Outputs.
+        self.DeclareVectorOutputPort("clearance", 1, self._CalcClearance)
+
+    def _CalcClearance(self, context: Context, output: BasicVector) -> None:
+        query = self._query_port.Eval(context)
+        pairs = query.ComputeSignedDistancePairwiseClosestPoints(self._horizon)
+        near = (p.distance for p in pairs if {p.id_A, p.id_B} & self._robot)
+        output.SetAtIndex(0, min(near, default=self._horizon))
