@@ -5,8 +5,10 @@ checks every range. Drake's `yaml_load_typed` refuses unknown keys.
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
@@ -145,6 +147,9 @@ class Scenario:
         """Raises ValueError for the first value out of bounds."""
         check_positive("plant_config", time_step=self.plant_config.time_step)
         check_positive("wall_camera", rate=self.wall_camera.rate)
+        for name, gain in dataclasses.asdict(self.arm.gains).items():
+            if not 0.0 <= gain < math.inf:
+                raise ValueError(f"arm.gains.{name} must be >= 0, got {gain!r}.")
         check_positive("cycle", period=self.cycle.period)
         check_positive("cycle", time_limit=self.cycle.time_limit)
         if not 8 <= self.arm.encoder_bits <= 32:
@@ -209,12 +214,14 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     if not isinstance(document, dict) or len(document) != 1:
         raise InputError(f"{path}: expected one top key, the scenario's name.")
     ((top, fields),) = document.items()
+    if not isinstance(fields, dict | None):
+        raise InputError(f"{path}: expected fields below {top!r}, got {fields!r}.")
     fields = dict(fields or {})
     fields.setdefault("name", str(top))
     for word in overrides:
         _override(fields, word)
     try:
-        scenario = yaml_load_typed(
+        scenario: Scenario = yaml_load_typed(
             schema=Scenario, data=yaml.safe_dump(fields), defaults=Scenario()
         )
         scenario.validate()
@@ -225,10 +232,11 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Returns the whole scenario as YAML that `load_scenario` reads back."""
-    return yaml_dump_typed({scenario.name: scenario}, schema=dict[str, Scenario])
+    text: str = yaml_dump_typed({scenario.name: scenario}, schema=dict[str, Scenario])
+    return text
 
 
-def _override(fields: dict, word: str) -> None:
+def _override(fields: dict[str, Any], word: str) -> None:
     key, separator, text = word.partition("=")
     if not separator or not key:
         raise InputError(f"--set {word!r}: expected key=value.")

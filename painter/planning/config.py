@@ -4,6 +4,7 @@ Plain mutable dataclasses, because Drake's `yaml_load_typed` fills them field by
 """
 
 import dataclasses
+import math
 
 from perception.config import check_positive
 
@@ -31,6 +32,8 @@ class TileConfig:
         check_positive(
             "tile", width=self.width, height=self.height, distance=self.distance
         )
+        if not 0.0 <= self.bottom < math.inf:
+            raise ValueError(f"tile.bottom must be >= 0 m, got {self.bottom!r}.")
 
 
 @dataclasses.dataclass(kw_only=True)
