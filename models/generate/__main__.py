@@ -1,0 +1,37 @@
+"""Writes every generated file below models/; see the package."""
+
+from pathlib import Path
+
+from models.generate.arm import MODEL as ARM
+from models.generate.mesh import block, rod, write_gltf
+from models.generate.tooling import CAMERA, FRAME, GUN
+from models.generate.urdf import write_urdf
+
+MODELS = (ARM, GUN, CAMERA, FRAME)
+
+
+def generated_files() -> dict[str, str]:
+    """Returns the text of every generated file, by its path below models/."""
+    files = {}
+    for model in MODELS:
+        files[f"{model.folder}/{model.folder}.urdf"] = write_urdf(model)
+        for link in model.links:
+            pieces = []
+            for s in link.collisions:
+                if hasattr(s, "size"):
+                    pieces.append(block("paint_white", s.center, s.size))
+                else:
+                    c = list(s.center)
+                    c["xyz".index(s.axis)] -= s.length / 2
+                    pieces.append(
+                        rod("aluminium", tuple(c), s.length, s.radius, axis=s.axis)
+                    )
+            files[f"{model.folder}/meshes/{link.name}.gltf"] = write_gltf(pieces)
+    return files
+
+
+if __name__ == "__main__":
+    root = Path(__file__).resolve().parents[1]
+    for path, text in generated_files().items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
+        (root / path).write_text(text)

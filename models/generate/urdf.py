@@ -1,0 +1,163 @@
+"""Writing URDF text from descriptions of links and joints."""
+
+from dataclasses import dataclass, field
+
+from models.generate.solids import Part, Shape, central_inertia
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """One link of a model.
+
+    Attributes:
+        name: Its name, and that of its mesh.
+        parts: What weighs something.
+        collisions: Convex shapes around it.
+    """
+
+    name: str
+    parts: list[Part]
+    collisions: list[Shape]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """A driven revolute joint.
+
+    Attributes:
+        name: Its name.
+        parent: Link before it.
+        child: Link after it; its frame is the joint's at zero.
+        xyz: Where it sits in the parent, m.
+        axis: Its axis in the child's frame.
+        lower: Lowest position, rad.
+        upper: Highest position, rad.
+        velocity: Greatest speed, rad/s.
+        acceleration: Greatest acceleration, rad/s².
+        effort: Greatest torque at the joint, N m.
+        gear_ratio: Turns of the motor a turn of the joint.
+        rotor_inertia: Of all that turns at motor speed, kg m².
+        damping: Viscous friction at the joint, N m s.
+    """
+
+    name: str
+    parent: str
+    child: str
+    xyz: tuple[float, float, float]
+    axis: str
+    lower: float
+    upper: float
+    velocity: float
+    acceleration: float
+    effort: float
+    gear_ratio: float
+    rotor_inertia: float
+    damping: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedFrame:
+    """A named frame on a link; `xyz` in m, `rpy` in rad."""
+
+    name: str
+    link: str
+    xyz: tuple[float, float, float]
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A URDF file: models/`folder`/`folder`.urdf."""
+
+    folder: str
+    links: list[Link]
+    joints: list[Joint] = field(default_factory=list)
+    frames: list[FixedFrame] = field(default_factory=list)
+
+
+_AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+
+
+def write_urdf(model: Model) -> str:
+    """Returns the text of a model's URDF file."""
+    blocks = [_link(link, model.folder) for link in model.links]
+    blocks += [_joint(joint) for joint in model.joints]
+    blocks += [_frame(frame) for frame in model.frames]
+    return (
+        '<?xml version="1.0"?>\n'
+        "<!-- Written by `python -m models.generate`: edit the description there. -->\n"
+        f'<robot name="{model.folder}" xmlns:drake="http://drake.mit.edu">\n'
+        + "".join(blocks)
+        + "</robot>\n"
+    )
+
+
+def _origin(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> str:
+    return f'<origin xyz="{_numbers(xyz)}" rpy="{_numbers(rpy)}"/>'
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value + 0.0:.15g}" for value in values)
+
+
+def _link(link: Link, folder: str) -> str:
+    mass, com, inertia = central_inertia(link.parts)
+    mesh = f"package://painter_models/{folder}/meshes/{link.name}.gltf"
+    terms = " ".join(
+        f'i{"xyz"[i]}{"xyz"[j]}="{inertia[i, j] + 0.0:.6g}"'
+        for i in range(3)
+        for j in range(i, 3)
+    )
+    lines = [
+        f'  <link name="{link.name}">',
+        "    <inertial>",
+        f"      {_origin(tuple(com.round(6)), (0.0, 0.0, 0.0))}",
+        f'      <mass value="{mass:.6g}"/>',
+        f"      <inertia {terms}/>",
+        "    </inertial>",
+        "    <visual>",
+        f'      <geometry><mesh filename="{mesh}"/></geometry>',
+        "    </visual>",
+    ]
+    for number, shape in enumerate(link.collisions, start=1):
+        lines += [
+            f'    <collision name="{link.name}_{number}">',
+            f"      {_origin(shape.center, shape.rpy)}",
+            f"      <geometry>{shape.urdf}</geometry>",
+            "    </collision>",
+        ]
+    return "\n".join([*lines, "  </link>\n"])
+
+
+def _joint(joint: Joint) -> str:
+    limit = (
+        f'lower="{joint.lower:g}" upper="{joint.upper:g}" '
+        f'velocity="{joint.velocity:g}" effort="{joint.effort:g}" '
+        f'drake:acceleration="{joint.acceleration:g}"'
+    )
+    lines = [
+        f'  <joint name="{joint.name}" type="revolute">',
+        f"    {_origin(joint.xyz, (0.0, 0.0, 0.0))}",
+        f'    <parent link="{joint.parent}"/>',
+        f'    <child link="{joint.child}"/>',
+        f'    <axis xyz="{_AXES[joint.axis]}"/>',
+        f"    <limit {limit}/>",
+        f'    <dynamics damping="{joint.damping:g}"/>',
+        "  </joint>",
+        f'  <transmission name="{joint.name}_transmission">',
+        "    <type>transmission_interface/SimpleTransmission</type>",
+        f'    <joint name="{joint.name}"/>',
+        f'    <actuator name="{joint.name}">',
+        f'      <drake:gear_ratio value="{joint.gear_ratio:g}"/>',
+        f'      <drake:rotor_inertia value="{joint.rotor_inertia:g}"/>',
+        "    </actuator>",
+        "  </transmission>\n",
+    ]
+    return "\n".join(lines)
+
+
+def _frame(frame: FixedFrame) -> str:
+    return (
+        f'  <frame name="{frame.name}" link="{frame.link}" '
+        f'xyz="{_numbers(frame.xyz)}" rpy="{_numbers(frame.rpy)}"/>\n'
+    )
