@@ -1,0 +1,225 @@
+"""PaintCycle: the phases in their order; pause, abort, refusals and faults."""
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from painter.errors import ReachError
+from painter.planning.spray_path import Motion, PaintProgram
+from painter.systems.paint_cycle import STAGES, PaintCycle
+from painter.systems.path_follower import PathFollower
+from painter.systems.stage import Stage
+from painter.systems.values import ArmStatus, DriveStatus, OperatorCommand, Phase
+from pydrake.math import RigidTransform
+
+DURATION = 1.0
+SPRAY = (0.3, 0.6)
+
+
+def still_motion(spray_on=()) -> Motion:
+    """A motion that stays where the arm is, so that any may follow any."""
+    return Motion(
+        time=np.array([0.0, DURATION]),
+        q=np.zeros((2, 5)),
+        v=np.zeros((2, 5)),
+        spray_on=np.array(spray_on, dtype=float).reshape(-1, 2),
+    )
+
+
+class ScriptedStage(Stage):
+    """Answers with a value, or fails."""
+
+    def __init__(self, stage: str, answer) -> None:
+        super().__init__(stage=stage, period=0.02)
+        self._answer = answer
+
+    def _Work(self, context, goal):
+        if isinstance(self._answer, Exception):
+            raise self._answer
+        return self._answer
+
+
+class Rig:
+    """Cycle, follower and scripted stages; the test plays operator and drives."""
+
+    def __init__(self, *, unattended=True, time_limit=60.0, **answers) -> None:
+        program = PaintProgram(
+            strokes=(),
+            motion=still_motion([SPRAY]),
+            X_WT=RigidTransform(),
+            standoff=0.3,
+            nominal_thickness=1e-4,
+        )
+        values = {
+            "motion_planner": still_motion(),
+            "wall_finder": "wall",
+            "wall_segmenter": "segmentation",
+            "spray_path_planner": program,
+        } | answers
+        builder = DiagramBuilder()
+        self.cycle = builder.AddNamedSystem(
+            "cycle",
+            PaintCycle(
+                unattended=unattended, period=0.02, look_time=0.5, time_limit=time_limit
+            ),
+        )
+        self.follower = builder.AddNamedSystem("follower", PathFollower(period=0.02))
+        for name in STAGES:
+            stage = builder.AddNamedSystem(name, ScriptedStage(name, values[name]))
+            builder.Connect(
+                self.cycle.GetOutputPort("request"), stage.GetInputPort("request")
+            )
+            builder.Connect(
+                stage.GetOutputPort("result"), self.cycle.GetInputPort(name)
+            )
+        builder.Connect(
+            self.cycle.GetOutputPort("motion_command"),
+            self.follower.GetInputPort("motion_command"),
+        )
+        builder.Connect(
+            self.follower.GetOutputPort("status"),
+            self.cycle.GetInputPort("follower_status"),
+        )
+        for port in ("arm_status", "operator"):
+            builder.ExportInput(self.cycle.GetInputPort(port), port)
+        builder.ExportInput(self.follower.GetInputPort("state"), "state")
+        self.diagram = builder.Build()
+        self.simulator = Simulator(self.diagram)
+        self.context = self.simulator.get_mutable_context()
+        self.diagram.GetInputPort("state").FixValue(self.context, np.zeros(10))
+        self.set("arm_status", ArmStatus())
+        self.set("operator", OperatorCommand())
+        self.words = 0
+
+    def set(self, port: str, value) -> None:
+        self.diagram.GetInputPort(port).FixValue(self.context, Value(value))
+
+    def say(self, word: str) -> None:
+        self.words += 1
+        self.set("operator", OperatorCommand(self.words, word))
+
+    def output(self, system, port: str):
+        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(self.context))
+
+    @property
+    def status(self):
+        return self.output(self.cycle, "cycle_status")
+
+    @property
+    def phases(self) -> list[str]:
+        return [data["phase"] for _, name, data in self.status.events if name == "phase"]
+
+    @property
+    def trigger(self) -> float:
+        return self.output(self.follower, "trigger")[0]
+
+    def advance_until(self, condition, limit: float = 40.0) -> None:
+        while not condition():
+            assert self.context.get_time() < limit, self.phases
+            self.simulator.AdvanceTo(self.context.get_time() + 0.02)
+
+    def advance_to_end(self) -> None:
+        self.advance_until(lambda: self.status.finished)
+
+
+ALL = "HOME LOOK SCAN SEGMENT PLAN REVIEW PAINT RETRACT DONE".split()
+
+
+def test_unattended_cycle_goes_through_all_phases():
+    rig = Rig()
+    rig.advance_to_end()
+    assert rig.phases == ALL
+    times = [time for time, name, _ in rig.status.events if name == "phase"]
+    look = times[ALL.index("SCAN")] - times[ALL.index("LOOK")]
+    # A move, the look, and a few decisions of 20 ms.
+    assert look == pytest.approx(DURATION + 0.5, abs=0.2)
+
+
+def test_camera_is_wanted_in_look_and_scan_alone():
+    rig = Rig()
+    wanted = set()
+
+    def note() -> bool:
+        if rig.output(rig.cycle, "camera_enabled")[0]:
+            wanted.add(rig.status.phase)
+        return rig.status.finished
+
+    rig.advance_until(note)
+    assert wanted == {Phase.LOOK, Phase.SCAN}
+
+
+def test_review_waits_for_approval():
+    rig = Rig(unattended=False)
+    rig.advance_until(lambda: rig.status.phase == Phase.REVIEW)
+    rig.simulator.AdvanceTo(rig.context.get_time() + 5.0)
+    assert rig.status.phase == Phase.REVIEW
+    rig.say("approve")
+    rig.advance_to_end()
+    assert rig.phases == ALL
+
+
+def test_pause_lets_the_stroke_end_and_resume_goes_on():
+    rig = Rig()
+    rig.advance_until(lambda: rig.trigger == 1.0)
+    rig.say("pause")
+    rig.simulator.AdvanceTo(rig.context.get_time() + 0.1)
+    assert rig.trigger == 1.0
+    rig.advance_until(lambda: rig.status.phase == Phase.PAUSED)
+    rig.simulator.AdvanceTo(rig.context.get_time() + 3.0)
+    assert rig.trigger == 0.0
+    assert rig.output(rig.follower, "status").rate == 0.0
+    rig.say("resume")
+    rig.advance_to_end()
+    assert rig.phases == [*ALL[:7], "PAUSED", "PAINT", "RETRACT", "DONE"]
+
+
+def test_abort_closes_the_gun_stands_and_retracts():
+    rig = Rig()
+    rig.advance_until(lambda: rig.trigger == 1.0)
+    rig.say("abort")
+    rig.simulator.AdvanceTo(rig.context.get_time() + 0.05)
+    assert rig.trigger == 0.0
+    rig.advance_to_end()
+    assert rig.phases[-1] == "ABORTED"
+    assert "operator" in rig.status.cause
+    # The retract motion ran: HOME, LOOK, SCAN, PAINT and then the fifth.
+    assert rig.output(rig.follower, "status").number == 5
+
+
+def test_a_word_out_of_place_is_logged_as_refused():
+    rig = Rig()
+    rig.advance_until(lambda: rig.status.phase == Phase.LOOK)
+    rig.say("approve")
+    rig.advance_to_end()
+    refused = [data for _, name, data in rig.status.events if name == "refused"]
+    assert refused == [{"word": "approve"}]
+    assert rig.phases == ALL
+
+
+def test_failed_stage_ends_in_fault_with_its_cause():
+    rig = Rig(spray_path_planner=ReachError("row 3 is out of reach"))
+    rig.advance_to_end()
+    assert rig.phases == [*ALL[:5], "FAULT"]
+    assert rig.status.cause == "spray_path_planner: ReachError: row 3 is out of reach"
+
+
+def test_drive_fault_closes_the_gun_and_stops_the_arm():
+    rig = Rig()
+    rig.advance_until(lambda: rig.trigger == 1.0)
+    drives = (DriveStatus(), DriveStatus("FAULT", 0x7500), *(DriveStatus(),) * 3)
+    rig.set("arm_status", ArmStatus(drives=drives))
+    rig.simulator.AdvanceTo(rig.context.get_time() + 0.05)
+    assert rig.trigger == 0.0
+    rig.advance_to_end()
+    assert rig.status.phase == Phase.FAULT
+    assert rig.status.cause == "drive 2: FAULT, fault code 0x7500"
+    assert rig.output(rig.follower, "status").rate == 0.0
+
+
+def test_a_cycle_over_its_time_limit_is_a_fault():
+    rig = Rig(unattended=False, time_limit=8.0)
+    rig.advance_to_end()
+    assert rig.status.phase == Phase.FAULT
+    assert "8 s" in rig.status.cause
