@@ -36,7 +36,12 @@ class MapConfig:
         min_range: Nearest depth used, m.
         max_range: Farthest depth used, m.
         edge_jump: Pixels next to a jump larger than this share of depth are dropped.
+        edge_window: Window within which they are, on the near side of the jump, px;
+            as large as the block matcher's, which makes near surfaces grow by half.
+        stride: Every so many-th pixel and row is used.
         min_count: Voxels with fewer pixels than this are not given out.
+        ghost_share: Nor are those with less than this share of the pixels, or of the
+            pictures, that the best voxel of the 3 x 3 columns around got.
     """
 
     voxel_size: float = 0.005
@@ -46,11 +51,18 @@ class MapConfig:
     min_range: float = 0.25
     max_range: float = 3.0
     edge_jump: float = 0.02
+    edge_window: int = 7
+    stride: int = 2
     min_count: int = 3
+    ghost_share: float = 0.15
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
         check_positive("map", **dataclasses.asdict(self))
+        if self.edge_window % 2 == 0:
+            raise ValueError(f"map.edge_window must be odd, got {self.edge_window!r}.")
+        if self.ghost_share >= 1.0:
+            raise ValueError(f"map.ghost_share must be < 1, got {self.ghost_share!r}.")
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -70,6 +82,7 @@ class SegmentationConfig:
         min_region_area: Smaller regions inherit from the nearest larger one, m².
         wall_distance_tolerance: How far the wall may be from the expected one, m.
         wall_angle_tolerance_deg: How far its normal may be from the expected one.
+        min_wall_share: Share of the points that the wall's plane has at least.
     """
 
     neighbors: int = 50
@@ -82,6 +95,7 @@ class SegmentationConfig:
     min_region_area: float = 0.005
     wall_distance_tolerance: float = 0.15
     wall_angle_tolerance_deg: float = 10.0
+    min_wall_share: float = 0.05
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
@@ -92,19 +106,28 @@ class SegmentationConfig:
 class StereoConfig:
     """Geometry and errors of a D435-like stereo depth camera.
 
-    Source: `perception/stereo.py` cites each value.
+    Source: Intel, "Tuning depth cameras for best performance" (best resolution), "D400
+    series data sheet", 337029 (field of view, baseline, range, left-imager reference)
+    and "Subpixel linearity improvement" (1/32 px, ripple); Intel's Grunnet-Jepsen in
+    librealsense issue 3904 (`subpixel`: 0.08 advised, 0.032 at best); `min_range` is
+    f B / 126 px, the matcher's search range (librealsense issue 3039). The shares, the
+    window and the grazing angle are assumptions until they are measured.
 
     Attributes:
         width: Depth image width, px.
         height: Depth image height, px.
         hfov_deg: Horizontal field of view.
-        baseline: Distance of the two imagers, m.
+        baseline: Distance of the two imagers, m; the right one lies along C's x.
         min_range: Nearest depth measured, m.
         max_range: Farthest depth measured, m.
         subpixel: Standard deviation of disparity, px.
         fixed_share: Share of the disparity variance that is a fixed pattern.
+        ripple: Amplitude of the disparity error that repeats with every pixel, px.
         quantum: Disparity step, px.
-        fattening: Window of the block matcher at depth edges, px.
+        fattening: Window of the block matcher, px: near sides grow by half of it.
+        fattening_share: Share of edges where they do.
+        flying_share: Share of the pixels grown over that lie between near and far.
+        grazing_deg: Angle between ray and surface normal beyond which pixels get lost.
         dropout: Share of pixels lost at random.
         hole_share: Share of a pane of glass that returns nothing.
         reflection_share: Share that returns a reflection; the rest sees through.
@@ -114,12 +137,16 @@ class StereoConfig:
     height: int = 480
     hfov_deg: float = 87.0
     baseline: float = 0.050
-    min_range: float = 0.17
+    min_range: float = 0.177
     max_range: float = 10.0
-    subpixel: float = 0.05
+    subpixel: float = 0.08
     fixed_share: float = 0.5
+    ripple: float = 0.02
     quantum: float = 0.03125
     fattening: int = 7
+    fattening_share: float = 0.7
+    flying_share: float = 0.15
+    grazing_deg: float = 60.0
     dropout: float = 0.01
     hole_share: float = 0.5
     reflection_share: float = 0.2
@@ -135,10 +162,37 @@ class StereoConfig:
             min_range=self.min_range,
             max_range=self.max_range,
             quantum=self.quantum,
+            grazing_deg=self.grazing_deg,
         )
-        shares = ("fixed_share", "dropout", "hole_share", "reflection_share")
-        for name in shares:
+        for name in (
+            "fixed_share",
+            "fattening_share",
+            "flying_share",
+            "dropout",
+            "hole_share",
+            "reflection_share",
+        ):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(
                     f"stereo.{name} must be 0 to 1, got {getattr(self, name)!r}."
                 )
+        if self.hole_share + self.reflection_share > 1.0:
+            raise ValueError("stereo.hole_share + reflection_share must be <= 1.")
+        for name in ("subpixel", "ripple"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ValueError(
+                    f"stereo.{name} must be 0 to 1 px, got {getattr(self, name)!r}."
+                )
+        if self.fattening < 1 or self.fattening % 2 == 0:
+            raise ValueError(
+                f"stereo.fattening must be odd and >= 1, got {self.fattening!r}."
+            )
+        for name, bound in (("hfov_deg", 180.0), ("grazing_deg", 90.0)):
+            if not getattr(self, name) < bound:
+                raise ValueError(
+                    f"stereo.{name} must be < {bound}, got {getattr(self, name)!r}."
+                )
+        if self.max_range > 65.535:
+            raise ValueError(
+                f"stereo.max_range must be <= 65.535 m, got {self.max_range!r}."
+            )

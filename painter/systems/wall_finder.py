@@ -1,0 +1,77 @@
+"""The stage that finds the wall at first sight."""
+
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
+
+from painter.systems.ports import EvalAs
+from painter.systems.stage import Stage
+from perception.config import SegmentationConfig, check_positive
+from perception.values import SurfaceMap, Wall
+from perception.wall import find_wall
+
+
+class WallFinder(Stage):
+    """Finds the wall near where the job expects it and lays the tile on it.
+
+    .. pydrake_system::
+
+        name: WallFinder
+        input_ports:
+        - request
+        - surface_map
+        output_ports:
+        - result
+
+    Ports:
+        request: StageRequest; acted on when it names "wall_finder" and is new.
+        surface_map: SurfaceMap in W, of the first look.
+        result: StageResult; its value is a Wall.
+
+    State is the last StageResult.
+    """
+
+    def __init__(
+        self,
+        *,
+        X_WT_expected: RigidTransform,
+        width: float,
+        height: float,
+        config: SegmentationConfig,
+        seed: int,
+        period: float,
+    ) -> None:
+        """Creates the stage.
+
+        Args:
+            X_WT_expected: Tile frame where the job expects it.
+            width: Of the tile, m, along T x.
+            height: Of the tile, m, along T y.
+            config: Thresholds.
+            seed: Of RANSAC's random draws.
+            period: Time between looks at the request, s.
+
+        Raises:
+            ValueError: A size is not positive or a threshold out of bounds.
+        """
+        check_positive("wall_finder", width=width, height=height, period=period)
+        config.validate()
+        super().__init__(stage="wall_finder", period=period)
+        self._X_WT_expected = X_WT_expected
+        self._size = {"width": width, "height": height}
+        self._config = config
+        self._seed = seed
+        # Inputs.
+        self._map_port = self.DeclareAbstractInputPort(
+            "surface_map", Value(SurfaceMap.empty())
+        )
+
+    def _Work(self, context: Context, goal: str) -> Wall:
+        surface_map = EvalAs(self._map_port, context, SurfaceMap)
+        return find_wall(
+            surface_map.p_WQs,
+            self._X_WT_expected,
+            **self._size,
+            config=self._config,
+            seed=self._seed,
+        )
