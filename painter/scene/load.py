@@ -1,0 +1,97 @@
+"""Reading scenes: by name, from a file, or drawn from a seed."""
+
+import dataclasses
+import typing
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+
+from painter.errors import InputError
+from painter.resources import models_path
+from painter.scene.config import Scene
+from painter.scene.random_scene import draw_random_scene
+
+_SUFFIX = ".scene.yaml"
+
+
+def named_scenes() -> list[str]:
+    """Returns the names of the scenes that come with the package."""
+    files = models_path("scenes").glob(f"*{_SUFFIX}")
+    return sorted(path.name.removesuffix(_SUFFIX) for path in files)
+
+
+def load_scene(name: str, seed: int) -> Scene:
+    """Loads a scene.
+
+    Args:
+        name: A name from `named_scenes()`, the path of a YAML file whose single top key
+            is the scene's name, or "random".
+        seed: Seed of the random scene; named scenes and files do not use it.
+
+    Returns:
+        The scene, checked.
+
+    Raises:
+        InputError: There is no such scene, a key is unknown or a value is not allowed;
+            names the file, the key, the value and the bound.
+    """
+    if name == "random":
+        return draw_random_scene(seed)
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        path = models_path("scenes", f"{name}{_SUFFIX}")
+        if not path.is_file():
+            known = ", ".join([*named_scenes(), "random"])
+            raise InputError(f"scene {name!r} is unknown; known are: {known}.")
+    try:
+        document = yaml.safe_load(path.read_text())
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such scene file.") from None
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+    if not isinstance(document, dict) or len(document) != 1:
+        raise InputError(f"{path}: expected one top key, the scene's name.")
+    ((top, fields),) = document.items()
+    try:
+        if fields is None:
+            fields = {}
+        _check_types(Scene, fields, "")
+        fields = {"name": str(top)} | fields
+        scene = yaml_load_typed(
+            schema=Scene, data=yaml.safe_dump(fields), defaults=Scene()
+        )
+        scene.validate()
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+    return scene
+
+
+def dump_scene(scene: Scene) -> str:
+    """Returns the whole scene as YAML that `load_scene` reads back."""
+    return yaml_dump_typed({scene.name: scene}, schema=dict[str, Scene])
+
+
+def _check_types(schema: Any, data: Any, where: str) -> None:
+    """Raises ValueError naming the field where data do not fit; Drake's does not."""
+    if dataclasses.is_dataclass(schema):
+        if not isinstance(data, dict):
+            raise ValueError(f"{where or 'scene'} must have fields, got {data!r}.")
+        known = {field.name: field.type for field in dataclasses.fields(schema)}
+        for key, value in data.items():
+            place = f"{where}.{key}" if where else str(key)
+            if key not in known:
+                raise ValueError(f"{place} is unknown; known are: {', '.join(known)}.")
+            _check_types(known[key], value, place)
+    elif typing.get_origin(schema) is list:
+        if not isinstance(data, list):
+            raise ValueError(f"{where} must be a list, got {data!r}.")
+        (item,) = typing.get_args(schema)
+        for i, value in enumerate(data):
+            _check_types(item, value, f"{where}[{i}]")
+    else:
+        words = {float: "a number", int: "a whole number", str: "a word"}
+        fits = isinstance(data, (int, float) if schema is float else schema)
+        if not fits or isinstance(data, bool):
+            raise ValueError(f"{where} must be {words[schema]}, got {data!r}.")
