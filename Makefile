@@ -58,7 +58,11 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(install_packages)
 	$(find_python)
 	install_packages $(SYSTEM_PACKAGES)
-	python=$$(find_python) || { install_packages python3-venv; python=$$(find_python); } \
+	for package in python3-venv python3.11-venv; do
+	  python=$$(find_python) && break
+	  install_packages $$package
+	done
+	python=$$(find_python) \
 	  || { echo "setup: no Python >= 3.11 with venv; set PYTHON=..." >&2; exit 1; }
 	[ -x $(BIN)/python ] || "$$python" -m venv $(VENV)
 	echo "setup: installing Python packages into $(VENV) (some minutes the first time)"
