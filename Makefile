@@ -21,6 +21,7 @@ help: ## List the targets
 	  | awk -F: '{printf "make %-10s %s\n", $$1, $$2}'
 
 setup: $(STAMP) ## Install system libraries (where allowed) and packages into .venv
+	@:
 
 # Installs Debian packages that are missing; without the right to, says what to type.
 define install_packages
