@@ -1,6 +1,7 @@
 """Triangle meshes of turned and extruded solids, and their glTF files."""
 
 import base64
+import itertools
 import json
 from dataclasses import dataclass
 
@@ -68,7 +69,7 @@ def turned(
     angles = np.linspace(0.0, 2.0 * np.pi, sides + 1)
     ring = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * w
     vertices, normals, triangles = [], [], []
-    for (s0, r0), (s1, r1) in zip(profile[:-1], profile[1:], strict=True):
+    for (s0, r0), (s1, r1) in itertools.pairwise(profile):
         first = sum(len(block) for block in vertices)
         slope = np.array([r0 - r1, s1 - s0])
         slope = slope / np.linalg.norm(slope)
@@ -152,7 +153,7 @@ def plate(
         rings.append(points + np.array(center))
     faces = [[*rings[0][::-1]], [*rings[-1]]]
     count = len(corners)
-    for lower, upper in zip(rings[:-1], rings[1:], strict=True):
+    for lower, upper in itertools.pairwise(rings):
         for i in range(count):
             j = (i + 1) % count
             faces.append([lower[i], lower[j], upper[j], upper[i]])

@@ -7,7 +7,7 @@ plant that was made of them.
 import numpy as np
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import PackageMap, Parser
+from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 

@@ -39,7 +39,8 @@ class ArmLimits(FrozenValue):
     def contains(self, q: FloatArray) -> BoolArray:
         """Tells which rows of `q` (n, 5), rad, are finite and within the limits."""
         with np.errstate(invalid="ignore"):
-            return np.all((q >= self.q_min) & (q <= self.q_max), axis=-1)
+            inside: BoolArray = np.all((q >= self.q_min) & (q <= self.q_max), axis=-1)
+        return inside
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +76,8 @@ class ArmKinematics(FrozenValue):
             lateral = abs(X_LF.translation()[1])
             if axis_error > _MOUNT_TOLERANCE or lateral > _MOUNT_TOLERANCE:
                 raise ValueError(
-                    f"{name} must look along L x from a point with L y = 0; its axis is "
-                    f"off by {axis_error:.2g}, its point by {lateral:.2g} m."
+                    f"{name} must look along L x from a point with L y = 0; its axis "
+                    f"is off by {axis_error:.2g}, its point by {lateral:.2g} m."
                 )
 
     @property
@@ -166,7 +167,9 @@ class ArmKinematics(FrozenValue):
         )
         points = np.stack([p_WS, p_WS, p_WE, p_WL, p_WL], axis=-1)
         levers = p_WG[:, :, None] - points
-        return np.concatenate([axes, np.cross(axes, levers, axis=1)], axis=1)
+        linear = np.cross(axes, levers, axis=1)
+        jacobian: FloatArray = np.concatenate([axes, linear], axis=1)
+        return jacobian
 
     def _joint_points(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Shoulder, elbow and wrist centre in W, each (n, 3)."""
@@ -174,7 +177,10 @@ class ArmKinematics(FrozenValue):
         up = np.array([0.0, 0.0, 1.0])
 
         def along(pitch: FloatArray) -> FloatArray:
-            return np.cos(pitch)[:, None] * ahead - np.sin(pitch)[:, None] * up
+            direction: FloatArray = (
+                np.cos(pitch)[:, None] * ahead - np.sin(pitch)[:, None] * up
+            )
+            return direction
 
         p_WS = np.broadcast_to(self.shoulder_height * up, ahead.shape)
         p_WE = p_WS + self.upper_arm * along(q[:, 1])
@@ -224,7 +230,8 @@ class ArmKinematics(FrozenValue):
         q2 = np.arctan2(-z, x) - np.arctan2(b * np.sin(q3), a + b * np.cos(q3))
         q = np.stack([yaw, q2, q3, pitch - q2 - q3, wrist_yaw], axis=-1)
         q[~np.isfinite(q).all(axis=1)] = np.nan
-        return np.pi - np.mod(np.pi - q, 2.0 * np.pi)
+        wrapped: FloatArray = np.pi - np.mod(np.pi - q, 2.0 * np.pi)
+        return wrapped
 
 
 def wrist_from_motors(angles: FloatArray) -> FloatArray:
