@@ -1,0 +1,36 @@
+"""`painter report`: rebuilds the report of a run from its folder."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from painter.cli.common import JsonOption, print_result
+from painter.run import folder as files
+from painter.run.catalog import FIGURES
+from painter.run.folder import RunFolder
+from painter.run.report import write_report
+
+
+def report(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Run folder, complete or not.")
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Rebuild report.json and report.html of a run from the run's other files.
+
+    Raises:
+        InputError: There is no such run folder, or a file in it cannot be read.
+    """
+    figures = write_report(RunFolder.open(folder))
+    if as_json:
+        print_result(figures, as_json=True)
+        return
+    known = {
+        info.name: info.text(figures)
+        for info in FIGURES
+        if info.value(figures) is not None
+    }
+    page = {"page": str(folder / files.PAGE)}
+    print_result({"result": figures["result"]} | known | page, as_json=False)
