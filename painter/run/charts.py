@@ -10,6 +10,7 @@ from painter.planning.spray_path import PaintProgram
 from painter.run import style
 from painter.run.film_figures import COVERED, HALF_COVERED, edge_distance
 from painter.run.time_figures import (
+    STOPPED,
     Event,
     compute_times,
     computing_phases,
@@ -24,7 +25,6 @@ from painter.run.tracking_figures import (
 )
 from painter.run.values import Executed, Film
 
-_STOPPED = ("FAULT", "ABORTED", "PAUSED")
 _CLOSED = "#c3cad3"
 
 
@@ -77,7 +77,7 @@ def timeline(events: Sequence[Event]) -> Figure:
     figure = style.new_figure(11.0, 0.8 + 0.3 * max(len(names), 1))
     axes = figure.add_subplot()
     for name, start, stop in spans:
-        color = style.VERMILION if name in _STOPPED else style.BLUE
+        color = style.VERMILION if name in STOPPED else style.BLUE
         axes.barh(rows[name], stop - start, left=start, height=0.62, color=color)
         axes.plot([start, start], [rows[name] - 0.31, rows[name] + 0.31], color=color)
     for name, row in rows.items():

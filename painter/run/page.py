@@ -16,7 +16,7 @@ from painter.run import folder as files
 from painter.run.catalog import FIGURES, HEADLINE, FigureInfo, figure_info
 from painter.run.figures import fan_width
 from painter.run.folder import RunFolder
-from painter.run.time_figures import COLLISION, DONE, named
+from painter.run.time_figures import COLLISION, DONE, STOPPED, named, phase_spans
 
 _TITLES = {
     "cycle_time_s": "Cycle time",
@@ -71,8 +71,9 @@ def _header(folder: RunFolder, figures: Mapping[str, Any]) -> str:
         parts.append(f'<a href="{files.SCENE}">3-D replay of the cycle</a>')
     notice = ""
     if not good:
-        spans = list(figures.get("phase_time_s", {}))
-        phase = f" after {spans[-2]}" if len(spans) > 1 else ""
+        phases = [name for name, _, _ in phase_spans(folder.events())]
+        working = [name for name in phases if name not in STOPPED]
+        phase = f" in {working[-1]}" if working else ""
         cause = escape(
             str(figures.get("cause") or "the run broke off; no cause is known")
         )
@@ -104,7 +105,8 @@ def _tiles(figures: Mapping[str, Any]) -> str:
 
 def _status(info: FigureInfo, figures: Mapping[str, Any]) -> tuple[str, str]:
     passes = info.passes(figures)
-    if passes is None:
+    # What a run did before it broke off earns it no tick.
+    if passes is None or (passes and figures["result"] != DONE):
         return "", ""
     return ("good", "✓ met") if passes else ("bad", "✗ missed")
 

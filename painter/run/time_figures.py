@@ -6,6 +6,7 @@ from typing import Any
 Event = Mapping[str, Any]
 
 DONE = "DONE"
+STOPPED = ("PAUSED", "FAULT", "ABORTED")
 STAGE = "stage"
 COLLISION = "collision"
 STARTED = "started"
@@ -20,8 +21,8 @@ def phase_spans(events: Sequence[Event]) -> list[tuple[str, float, float]]:
     phases = [event for event in events if "phase" in event]
     ends = [float(event["time"]) for event in phases[1:]]
     if phases:
-        last = phases[-1] if phases[-1]["phase"] == DONE else events[-1]
-        ends.append(float(last["time"]))
+        done = phases[-1]["phase"] == DONE
+        ends.append(float(phases[-1]["time"]) if done else _end(events))
     return [
         (str(event["phase"]), float(event["time"]), end)
         for event, end in zip(phases, ends, strict=True)
@@ -58,8 +59,10 @@ def compute_times(events: Sequence[Event]) -> dict[str, float]:
 
 def motion_time(events: Sequence[Event]) -> float | None:
     """Robot time from the start to DONE (or to where the log ends), s."""
-    done = [e for e in events if e.get("phase") == DONE] or events[-1:]
-    return float(done[0]["time"]) - float(events[0]["time"]) if done else None
+    if not events:
+        return None
+    done = [float(event["time"]) for event in events if event.get("phase") == DONE]
+    return (done[0] if done else _end(events)) - float(events[0]["time"])
 
 
 def named(events: Sequence[Event], name: str) -> list[Event]:
@@ -91,3 +94,8 @@ def timing_figures(events: Sequence[Event]) -> dict[str, Any]:
             motion / wall_clock if motion is not None and wall_clock else None
         ),
     }
+
+
+def _end(events: Sequence[Event]) -> float:
+    # What is found out afterwards, such as a collision, is logged last.
+    return max(float(event["time"]) for event in events)

@@ -114,7 +114,6 @@ def test_no_draft_stays_behind(full_folder):
         (files.EXECUTED, RunFolder.executed),
         (files.FILM, RunFolder.film),
         (files.TRUTH, RunFolder.truth),
-        (files.SCENARIO, RunFolder.scenario),
     ],
 )
 @pytest.mark.parametrize("keep", [0, 0.6])
@@ -122,10 +121,15 @@ def test_file_cut_short_is_named(full_folder, name, read, keep):
     path = full_folder.path / name
     whole = path.read_bytes()
     path.write_bytes(whole[: int(keep * len(whole))] if keep else b"\x00\xff")
-    if name == files.SCENARIO and keep:
-        pytest.skip("The first lines of a YAML mapping are a YAML mapping.")
     with pytest.raises(InputError, match=name):
         read(full_folder)
+
+
+@pytest.mark.parametrize("text", ["", "- cubes\n", "a: 1\nb: 2\n", "cubes: [\n"])
+def test_scenario_file_of_another_form_is_named(tmp_path, text):
+    dut = RunFolder.create(tmp_path, text)
+    with pytest.raises(InputError, match=r"scenario\.yaml"):
+        dut.scenario()
 
 
 def test_numbers_have_six_digits():

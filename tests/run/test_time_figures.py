@@ -59,7 +59,8 @@ def test_computing_belongs_to_the_phase_in_which_it_was_logged():
 
 
 def test_log_that_breaks_off_counts_to_its_end():
-    broken = LOG[:3]
+    collision = {"time": 1.0, "event": "collision"}
+    broken = [*LOG[:3], collision]
     assert phase_times(broken) == {"HOME": 2.0, "LOOK": 1.0}
     assert time_figures(broken)["motion_time_s"] == 3.0
     assert timing_figures(broken)["wall_clock_s"] is None

@@ -115,8 +115,10 @@ def test_faulty_run_stays_incomplete_and_names_its_cause(
     assert not folder.is_complete
     assert (folder.path / files.INCOMPLETE).read_text() == f"FAULT: {cause}\n"
     page = page_of(folder)
-    assert "not complete: FAULT after PLAN" in page
+    assert "not complete: FAULT in PLAN" in page
     assert "ReachError: stroke 3 &lt;left&gt;" in page
+    # The mask is right, but no target is met by a run that failed.
+    assert "✓" not in page
 
 
 def test_killed_run_is_reported_as_interrupted(started_folder, surface_map):
