@@ -1,7 +1,8 @@
 """The wall tile: where it is expected and how its grids are laid on it.
 
 T has its origin at the tile's lower-left corner as seen by the robot, x right, y up, z
-out of the wall towards the robot. Grids over T have shape (ny, nx), row 0 at the bottom.
+out of the wall towards the robot. Grids over T have shape (ny, nx), row 0 at the
+bottom.
 """
 
 import numpy as np
@@ -40,14 +41,14 @@ def cell_centres(
     Args:
         shape: (ny, nx) of the grid.
         cell: Edge of a cell, m.
-        margin: How far the grid begins outside the tile, left of and below T's origin, m.
+        margin: How far left of and below T's origin the grid begins, m.
 
     Returns:
         x (nx,) of the columns and y (ny,) of the rows, m, in T.
     """
     ny, nx = shape
-    x = (np.arange(nx) + 0.5) * cell - margin
-    y = (np.arange(ny) + 0.5) * cell - margin
+    x = (np.arange(nx, dtype=np.float64) + 0.5) * cell - margin
+    y = (np.arange(ny, dtype=np.float64) + 0.5) * cell - margin
     return x, y
 
 
