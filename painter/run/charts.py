@@ -96,7 +96,7 @@ def timeline(events: Sequence[Event]) -> Figure:
     total = sum(compute_times(events).values())
     mark = Line2D([], [], marker="D", ls="", color=style.ORANGE, mec="white")
     mark.set_label(f"computing while the arm stands, {total:.1f} s in all")
-    axes.legend(handles=[mark], loc="lower left")
+    figure.legend(handles=[mark], loc="outside upper right")
     return figure
 
 
