@@ -37,7 +37,7 @@ class CameraIntrinsics:
         """Makes the intrinsics of a stereo camera without distortion.
 
         Source: Intel, "Subpixel linearity improvement for RealSense depth cameras":
-        f = (W / 2) / tan(HFOV / 2); the centre is that of Drake's `CameraInfo`.
+        f = (W / 2) / tan(HFOV / 2), the axis through the middle of the picture.
         """
         focal = config.width / 2 / math.tan(math.radians(config.hfov_deg) / 2)
         return cls(
