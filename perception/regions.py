@@ -144,6 +144,24 @@ def absorb_tiny_regions(
     return np.where(tiny[regions], absorbed[rows, columns], absorbed)
 
 
+def drop_specks(mask: BoolArray, *, min_area: float, cell: float) -> BoolArray:
+    """Takes tiny parts that stand alone out of a mask.
+
+    A stray return in a large hole, such as a window, inherits from the wall as the
+    nearest; it does not touch the wall and is not to be painted.
+
+    Args:
+        mask: (ny, nx).
+        min_area: Area below which a part (8 neighbours) is tiny, m².
+        cell: Edge of a cell, m.
+
+    Returns:
+        (ny, nx) the mask without them.
+    """
+    parts, _ = label(mask, structure=np.ones((3, 3)))
+    return mask & ~_tiny(parts, min_area=min_area, cell=cell)[parts]
+
+
 def sort_by_area(regions: IntArray) -> IntArray:
     """Step 6: labels regions by area.
 

@@ -13,6 +13,7 @@ from perception.planes import Plane, segment_planes
 from perception.regions import (
     absorb_tiny_regions,
     adjacent_regions,
+    drop_specks,
     euclidean_clusters,
     join_fragments,
     sort_by_area,
@@ -189,7 +190,7 @@ def segment_tile(
     # is for the cells of no region, numbered -1.
     region_plane = np.full(int(regions.max()) + 2, NOTHING, dtype=np.int64)
     region_plane[regions.ravel()] = np.where(regions == parts, grid.labels, 0).ravel()
-    wall_mask = region_plane[absorbed] == wall_plane
+    wall_mask = drop_specks(region_plane[absorbed] == wall_plane, **area)
     if not wall_mask.any():
         raise NoWallError(
             f"the wall's plane has no region of {config.min_region_area:g} m² on the "

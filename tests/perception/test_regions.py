@@ -8,6 +8,7 @@ from perception.label_grid import NOTHING, LabelGrid
 from perception.regions import (
     absorb_tiny_regions,
     adjacent_regions,
+    drop_specks,
     euclidean_clusters,
     join_fragments,
     sort_by_area,
@@ -167,3 +168,13 @@ def test_labels_are_sorted_by_area():
     np.testing.assert_array_equal(
         sort_by_area(regions), [[4, 4, 2, 2], [0, 1, 1, 1], [5, 3, 3, 0]]
     )
+
+
+def test_specks_alone_leave_the_mask():
+    mask = np.zeros((30, 30), dtype=bool)
+    mask[:, :5] = True  # 150 cells ...
+    mask[10, 5] = mask[11, 6] = True  # ... and two that touch it, by a corner too.
+    mask[10:17, 20:27] = True  # 49 cells alone.
+    kept = drop_specks(mask, min_area=0.005, cell=CELL)
+    assert kept.sum() == 152
+    assert not kept[:, 7:].any()

@@ -1,0 +1,103 @@
+"""What `painter segment` leaves in its folder: values, figures, pictures."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from painter.run.segmentation_picture import segmentation_picture
+from perception.recorded import contrast
+from perception.segmentation import SegmentationSteps
+from perception.store import save_segmentation, save_wall_mask
+
+
+def write_recorded_wall(
+    folder: Path, steps: SegmentationSteps, *, title: str, threshold: float
+) -> dict[str, Any]:
+    """Writes `segmentation.npz`, `.json` and `.png` and `wall_mask.png`.
+
+    Args:
+        folder: Where to write; exists.
+        steps: The segmentation with its intermediate results.
+        title: Heading of the picture.
+        threshold: Inlier distance of the planes, m.
+
+    Returns:
+        The figures that were written to `segmentation.json`.
+    """
+    figures = segmentation_figures(steps, threshold=threshold)
+    save_segmentation(folder / "segmentation.npz", steps.segmentation)
+    save_wall_mask(folder / "wall_mask.png", steps.segmentation.wall_mask)
+    (folder / "segmentation.json").write_text(json.dumps(figures, indent=2) + "\n")
+    segmentation_picture(folder / "segmentation.png", steps, title=title)
+    return figures
+
+
+def segmentation_figures(
+    steps: SegmentationSteps, *, threshold: float
+) -> dict[str, Any]:
+    """Sums a segmentation up in JSON values.
+
+    Args:
+        steps: The segmentation with its intermediate results.
+        threshold: Inlier distance of the planes, m.
+
+    Returns:
+        Counts of points; the wall's distance from the origin of the cloud's frame,
+        normal (towards it) and rms; areas; and lists of planes and of regions.
+    """
+    result, found = steps.segmentation, steps.found
+    area = result.cell**2
+    normal = result.X_WT.rotation().matrix()[:, 2]
+    plane = found.planes[steps.wall_plane - 1]
+    kept = found.p_WQs[:, found.kept]
+    seen = result.labels > 0
+    return {
+        "points": int(found.kept.size),
+        "outliers": int(found.kept.size - found.kept_count),
+        "wall_distance_m": _rounded(abs(plane.offset)),
+        "wall_normal": [_rounded(value) for value in normal],
+        "wall_rms_m": _rounded(steps.wall.rms),
+        "wall_point_share": _rounded(steps.wall.inlier_share),
+        "wall_contrast": _finite(contrast(plane, kept, threshold=threshold)),
+        "wall_area_m2": _rounded(np.count_nonzero(result.wall_mask) * area),
+        "other_area_m2": _rounded(np.count_nonzero(seen & ~result.wall_mask) * area),
+        "unseen_area_m2": _rounded(np.count_nonzero(~seen) * area),
+        "planes": [
+            {
+                "normal": [_rounded(value) for value in plane.normal],
+                "offset_m": _rounded(plane.offset),
+                "rms_m": _rounded(plane.rms),
+                "points": plane.count,
+            }
+            for plane in found.planes
+        ],
+        "regions": [_region_figures(steps, label) for label in _labels(steps)],
+    }
+
+
+def _labels(steps: SegmentationSteps) -> range:
+    return range(1, int(steps.segmentation.labels.max()) + 1)
+
+
+def _region_figures(steps: SegmentationSteps, label: int) -> dict[str, Any]:
+    result = steps.segmentation
+    cells = result.labels == label
+    depth = result.depth[cells]
+    depth = depth[np.isfinite(depth)]
+    return {
+        "label": label,
+        "area_m2": _rounded(np.count_nonzero(cells) * result.cell**2),
+        "median_depth_m": _rounded(np.median(depth)) if depth.size else None,
+        "wall": bool(result.wall_mask[cells].any()),
+    }
+
+
+def _rounded(value: float) -> float:
+    return round(float(value), 6)
+
+
+def _finite(value: float) -> float | None:
+    """JSON knows no infinity."""
+    return _rounded(value) if np.isfinite(value) else None

@@ -1,0 +1,162 @@
+"""Pictures of a segmentation: what was seen, labels, depth, mask."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, TwoSlopeNorm
+from matplotlib.patches import Patch
+
+from painter.run import style
+from perception.segmentation import SegmentationSteps
+from perception.values import WallSegmentation
+
+_WALL = "#8fc79a"
+_UNSEEN = "#d9dde1"
+_OTHERS = (style.ORANGE, style.SKY, style.BLUE, style.VERMILION, style.PURPLE)
+_DEPTH_LIMIT = 0.15  # Of the colour scale, m.
+
+
+def segmentation_picture(path: Path, steps: SegmentationSteps, *, title: str) -> None:
+    """Draws the input, the labels, the depth and the mask side by side.
+
+    Args:
+        path: PNG file to write.
+        steps: The segmentation with its intermediate results.
+        title: Heading.
+    """
+    result = steps.segmentation
+    ny, nx = result.labels.shape
+    panel = 4.2
+    figure = style.new_figure(4 * panel + 1.2, panel * min(1.6, ny / nx) + 0.9)
+    axes = figure.subplots(1, 4, sharex=True, sharey=True)
+    draw_points(axes[0], steps)
+    draw_labels(axes[1], result)
+    draw_depth(axes[2], result)
+    draw_mask(axes[3], result)
+    for ax in axes[1:]:
+        ax.set_ylabel("")
+    figure.suptitle(title, fontsize=13, fontweight="bold", x=0.01, ha="left")
+    path.write_bytes(style.png(figure, dpi=110))
+
+
+def draw_points(ax: Axes, steps: SegmentationSteps) -> None:
+    """Draws the cloud as seen from the robot, coloured by depth.
+
+    Args:
+        ax: Where to draw.
+        steps: The segmentation with its cloud.
+    """
+    found, result = steps.found, steps.segmentation
+    p_TQs = result.X_WT.inverse() @ found.p_WQs
+    width, height = _size(result)
+    inside = (p_TQs[:2] >= 0.0).all(axis=0)
+    inside &= (p_TQs[0] <= width) & (p_TQs[1] <= height)
+    ax.set_facecolor(_UNSEEN)
+    shown = np.flatnonzero(inside & found.kept)
+    # Far points first, so that near ones cover them.
+    shown = shown[np.argsort(p_TQs[2, shown])]
+    dots = {"s": 1.2, "linewidths": 0, "rasterized": True}
+    x, y, z = p_TQs[:, shown]
+    ax.scatter(x, y, c=z, cmap="RdYlBu", norm=_depth_norm(), **dots)
+    x, y, _ = p_TQs[:, inside & ~found.kept]
+    ax.scatter(x, y, c="black", **{**dots, "s": 3.0})
+    removed = found.kept.size - found.kept_count
+    _finish(ax, result, f"Cloud ({found.kept.size:,} points, {removed:,} outliers)")
+
+
+def draw_labels(ax: Axes, result: WallSegmentation) -> None:
+    """Draws the regions; wall in green, nothing seen in grey.
+
+    Args:
+        ax: Where to draw.
+        result: The segmentation.
+    """
+    count = int(result.labels.max())
+    colors, handles = [_UNSEEN], []
+    if (result.labels == 0).any():
+        handles.append(Patch(color=_UNSEEN, label="nothing seen"))
+    others = 0
+    for label in range(1, count + 1):
+        cells = result.labels == label
+        wall = bool(result.wall_mask[cells].any())
+        colors.append(_WALL if wall else _OTHERS[others % len(_OTHERS)])
+        others += not wall
+        depth = result.depth[cells]
+        depth = depth[np.isfinite(depth)]
+        if label <= 6 and depth.size:
+            kind = "wall" if wall else f"{100 * np.median(depth):+.1f} cm"
+            area = np.count_nonzero(cells) * result.cell**2
+            handles.append(
+                Patch(color=colors[-1], label=f"{label}: {kind}, {area:.2f} m²")
+            )
+    ax.imshow(
+        result.labels,
+        cmap=ListedColormap(colors),
+        vmin=-0.5,
+        vmax=count + 0.5,
+        **_placement(result),
+    )
+    ax.legend(handles=handles, fontsize=7, loc="lower left", framealpha=0.9)
+    _finish(ax, result, f"Labels ({count} regions by area)")
+
+
+def draw_depth(ax: Axes, result: WallSegmentation) -> None:
+    """Draws the depth from the wall's plane.
+
+    Args:
+        ax: Where to draw.
+        result: The segmentation.
+    """
+    ax.set_facecolor(_UNSEEN)
+    image = ax.imshow(
+        100.0 * result.depth,
+        cmap="RdYlBu",
+        norm=_depth_norm(scale=100.0),
+        **_placement(result),
+    )
+    bar = ax.figure.colorbar(image, ax=ax, shrink=0.75, pad=0.02, extend="both")
+    bar.set_label("cm before the wall's plane", fontsize=8)
+    bar.ax.tick_params(labelsize=8)
+    _finish(ax, result, "Depth")
+
+
+def draw_mask(ax: Axes, result: WallSegmentation) -> None:
+    """Draws the mask: white = paint.
+
+    Args:
+        ax: Where to draw.
+        result: The segmentation.
+    """
+    ax.imshow(result.wall_mask, cmap="gray", vmin=0, vmax=1, **_placement(result))
+    area = np.count_nonzero(result.wall_mask) * result.cell**2
+    _finish(ax, result, f"Mask (white = paint, {area:.2f} m²)")
+
+
+def _depth_norm(scale: float = 1.0) -> TwoSlopeNorm:
+    limit = _DEPTH_LIMIT * scale
+    return TwoSlopeNorm(0.0, vmin=-limit, vmax=limit)
+
+
+def _size(result: WallSegmentation) -> tuple[float, float]:
+    ny, nx = result.labels.shape
+    return nx * result.cell, ny * result.cell
+
+
+def _placement(result: WallSegmentation) -> dict[str, Any]:
+    width, height = _size(result)
+    return {
+        "origin": "lower",
+        "extent": (0.0, width, 0.0, height),
+        "interpolation": "nearest",
+    }
+
+
+def _finish(ax: Axes, result: WallSegmentation, title: str) -> None:
+    width, height = _size(result)
+    ax.set(xlim=(0.0, width), ylim=(0.0, height), aspect="equal")
+    ax.set_xlabel("T x, m", fontsize=8)
+    ax.set_ylabel("T y, m", fontsize=8)
+    ax.tick_params(labelsize=8)
+    ax.set_title(title, fontsize=10, loc="left")

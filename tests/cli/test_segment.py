@@ -1,0 +1,132 @@
+"""`painter segment` from the words on the command line to the files."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+from pydrake.math import RigidTransform, RotationMatrix
+
+from painter.cli.main import run
+from perception.store import load_segmentation
+from perception.synthetic import Patch, synthetic_wall
+
+# As a camera sees it, 0.8 m ahead: T x = C x, T y = -C y, T z = -C z.
+X_CT = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [-1.0, 1.0, 0.8])
+BOX = Patch(0.2, 0.3, 0.7, 1.2, 0.1)
+
+
+@pytest.fixture
+def cloud(tmp_path):
+    """A wall with a box low on the left, 1 cm apart, as an NPY file."""
+    rng = np.random.default_rng(0)
+    points = synthetic_wall([BOX], spacing=0.01, margin=0.0, X_WT=X_CT, rng=rng)
+    np.save(tmp_path / "wall.npy", points.T)
+    return tmp_path / "wall.npy"
+
+
+def test_folder_holds_the_segmentation(cloud, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert run(["segment", str(cloud), "--out", str(out), "--cell", "0.02"]) == 0
+    assert sorted(path.name for path in out.iterdir()) == [
+        "segmentation.json",
+        "segmentation.npz",
+        "segmentation.png",
+        "wall_mask.png",
+    ]
+    result = load_segmentation(out / "segmentation.npz")
+    assert result.wall_mask.shape == (100, 100)
+    figures = json.loads((out / "segmentation.json").read_text())
+    assert figures["wall_distance_m"] == pytest.approx(0.8, abs=1e-3)
+    assert figures["wall_area_m2"] == pytest.approx(4.0 - 0.45, abs=0.05)
+    assert figures["regions"][1]["median_depth_m"] == pytest.approx(0.1, abs=2e-3)
+    picture = np.asarray(Image.open(out / "wall_mask.png"))
+    # The box is low on the left: x 0.2 to 0.7 m, 0.3 to 1.2 m above the lower edge.
+    assert (picture[45:80, 15:30] == 0).all()
+    assert (picture[:35, 15:30] == 255).all()
+    assert "wall_distance_m" in capsys.readouterr().out
+
+
+def test_json_is_alone_on_stdout(cloud, tmp_path, capsys):
+    words = ["segment", str(cloud), "--out", str(tmp_path / "out"), "--json"]
+    assert run([*words, "--cell", "0.02"]) == 0
+    assert json.loads(capsys.readouterr().out)["points"] == 40000
+
+
+def test_units_and_up_are_taken(cloud, tmp_path):
+    # The same cloud in mm and turned upside down: the box comes out high on the right.
+    np.save(cloud, np.load(cloud) * 1000.0)
+    words = ["segment", str(cloud), "--out", str(tmp_path / "out"), "--unit", "mm"]
+    assert run([*words, "--up", "y", "--cell", "0.02", "--tile", "2x2"]) == 0
+    mask = load_segmentation(tmp_path / "out" / "segmentation.npz").wall_mask
+    assert not mask[45:80, 70:85].any()
+    assert mask[:35, 15:85].all()
+
+
+def test_same_words_same_files(cloud, tmp_path):
+    for name in ("a", "b"):
+        words = ["segment", str(cloud), "--out", str(tmp_path / name)]
+        assert run([*words, "--cell", "0.02", "--seed", "3"]) == 0
+    for name in ("segmentation.json", "wall_mask.png"):
+        one, other = ((tmp_path / folder / name).read_bytes() for folder in "ab")
+        assert one == other
+
+
+def test_depth_image_is_taken(tmp_path):
+    depth = np.full((120, 160), 700, dtype=np.uint16)
+    Image.fromarray(depth).save(tmp_path / "depth.png")
+    camera = {"width": 160, "height": 120, "fx": 80, "fy": 80, "cx": 80, "cy": 60}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    words = ["segment", str(tmp_path / "depth.png"), "--out", str(tmp_path / "out")]
+    words += ["--intrinsics", str(tmp_path / "camera.json"), "--tile", "1x0.8"]
+    assert run([*words, "--cell", "0.02"]) == 0
+    result = load_segmentation(tmp_path / "out" / "segmentation.npz")
+    assert result.wall_mask.mean() > 0.95
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--tile", "2"], "--tile must be WxH"),
+        (["--tile", "2x-1"], "--tile must be > 0"),
+        (["--tile", "0.001x1"], "smaller than a cell"),
+        (["--tile", "900x900"], "more than 4e+06 cells"),
+        (["--cell", "0"], "--cell must be > 0"),
+        (["--distance", "-1"], "--distance must be > 0"),
+        (["--up", "w"], "'w' is not one of"),
+        (["--unit", "mile"], "'mile' is not one of"),
+        (["--set", "segmentation.nonsense=1"], "nonsense"),
+        (["--intrinsics", "camera.json"], "--intrinsics is for a depth PNG"),
+    ],
+)
+def test_wrong_use_is_one_line_and_exit_2(cloud, tmp_path, capsys, words, message):
+    assert run(["segment", str(cloud), "--out", str(tmp_path / "out"), *words]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("array", "code", "message"),
+    [
+        (np.zeros((0, 3)), 2, "no points"),
+        (np.full((500, 3), np.nan), 2, "none of the 500 points is finite"),
+        (np.ones((50, 3)), 1, "50 finite points"),
+        (np.outer(np.arange(500.0), [1, 2, 3]), 1, "no plane is a wall: there is none"),
+    ],
+)
+def test_unusable_clouds_leave_no_folder(tmp_path, capsys, array, code, message):
+    np.save(tmp_path / "cloud.npy", array)
+    words = ["segment", str(tmp_path / "cloud.npy"), "--out", str(tmp_path / "out")]
+    assert run(words) == code
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cloud.npy"]
+
+
+def test_missing_file_is_exit_2(tmp_path, capsys):
+    words = ["segment", str(tmp_path / "no.ply"), "--out", str(tmp_path / "out")]
+    assert run(words) == 2
+    assert "no.ply: no such file" in capsys.readouterr().err

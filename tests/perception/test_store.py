@@ -1,0 +1,84 @@
+"""Segmentations survive a file; masks are pictures as seen from the robot."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from perception.errors import CloudReadError
+from perception.store import load_segmentation, save_segmentation, save_wall_mask
+from perception.values import WallSegmentation
+
+
+def make_segmentation():
+    """Two rows of three cells, all different."""
+    return WallSegmentation(
+        labels=np.array([[1, 1, 2], [0, 1, 3]], dtype=np.uint16),
+        depth=np.array([[0.0, 0.001, -0.1], [np.nan, 0.0, 0.2]], dtype=np.float32),
+        wall_mask=np.array([[True, True, False], [False, True, False]]),
+        X_WT=RigidTransform(RollPitchYaw(0.1, -0.2, 2.0), [1.0, 2.0, 3.0]),
+        cell=0.01,
+    )
+
+
+def test_segmentation_comes_back_as_it_was(tmp_path):
+    saved = make_segmentation()
+    save_segmentation(tmp_path / "segmentation.npz", saved)
+    loaded = load_segmentation(tmp_path / "segmentation.npz")
+    for name in ("labels", "depth", "wall_mask"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(saved, name))
+        assert getattr(loaded, name).dtype == getattr(saved, name).dtype
+    assert loaded.X_WT.IsExactlyEqualTo(saved.X_WT)
+    assert loaded.cell == 0.01
+
+
+def test_file_has_the_names_and_types_of_the_design(tmp_path):
+    save_segmentation(tmp_path / "segmentation.npz", make_segmentation())
+    with np.load(tmp_path / "segmentation.npz") as file:
+        found = {name: (file[name].dtype.name, file[name].shape) for name in file}
+    assert found == {
+        "labels": ("uint16", (2, 3)),
+        "depth": ("float32", (2, 3)),
+        "wall_mask": ("bool", (2, 3)),
+        "X_WT": ("float64", (4, 4)),
+        "cell": ("float64", ()),
+    }
+
+
+def test_mask_has_its_top_row_first(tmp_path):
+    save_wall_mask(tmp_path / "wall_mask.png", make_segmentation().wall_mask)
+    picture = np.asarray(Image.open(tmp_path / "wall_mask.png"))
+    np.testing.assert_array_equal(picture, [[0, 255, 0], [255, 255, 0]])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"labels": None}, "labels is missing"),
+        ({"depth": np.zeros((3, 2))}, r"depth has shape \(3, 2\)"),
+        ({"X_WT": np.zeros((4, 4))}, "X_WT is no pose"),
+        ({"X_WT": np.diag([1.0, 1.0, -1.0, 1.0])}, "X_WT is no pose"),
+        ({"cell": 0.0}, "cell must be > 0 m, got 0.0"),
+    ],
+)
+def test_wrong_content_is_refused(tmp_path, changes, message):
+    path = tmp_path / "segmentation.npz"
+    save_segmentation(path, make_segmentation())
+    with np.load(path) as file:
+        content = {**file, **changes}
+    np.savez(path, **{name: x for name, x in content.items() if x is not None})
+    with pytest.raises(CloudReadError, match=message):
+        load_segmentation(path)
+
+
+def test_missing_damaged_and_foreign_files_are_refused(tmp_path):
+    path = tmp_path / "segmentation.npz"
+    with pytest.raises(CloudReadError, match="no such file"):
+        load_segmentation(path)
+    save_segmentation(path, make_segmentation())
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(CloudReadError, match="no segmentation"):
+        load_segmentation(path)
+    np.save(tmp_path / "lone.npy", np.zeros(3))
+    with pytest.raises(CloudReadError, match="labels is missing"):
+        load_segmentation(tmp_path / "lone.npy")

@@ -1,0 +1,81 @@
+"""The wall finder as a stage: asked, it answers with a wall or a reason."""
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+
+from painter.systems.values import StageRequest, StageResult
+from painter.systems.wall_finder import WallFinder
+from perception.config import SegmentationConfig
+from perception.synthetic import synthetic_wall
+from perception.values import SurfaceMap, Wall
+
+X_WT_EXPECTED = RigidTransform([0.3, -0.2, 1.0])
+
+
+def make_map(p_WQs):
+    """A surface map of bare points."""
+    return SurfaceMap.empty().replace(p_WQs=p_WQs)
+
+
+def wall_map(offset=0.0):
+    """A wall `offset` m before the expected one."""
+    X_WT = X_WT_EXPECTED @ RigidTransform([0.0, 0.0, offset])
+    rng = np.random.default_rng(0)
+    return make_map(synthetic_wall([], spacing=0.02, X_WT=X_WT, rng=rng))
+
+
+def make_finder(**changes):
+    """A finder for a 2 x 2 m tile."""
+    options = {
+        "X_WT_expected": X_WT_EXPECTED,
+        "width": 2.0,
+        "height": 2.0,
+        "config": SegmentationConfig(),
+        "seed": 1,
+        "period": 0.1,
+    }
+    return WallFinder(**{**options, **changes})
+
+
+def answer(request, surface_map):
+    """The result after one look at a request."""
+    dut = make_finder()
+    simulator = Simulator(dut)
+    context = simulator.get_mutable_context()
+    dut.GetInputPort("request").FixValue(context, Value(request))
+    dut.GetInputPort("surface_map").FixValue(context, Value(surface_map))
+    simulator.AdvanceTo(0.05)
+    return dut.GetOutputPort("result").Eval(context)
+
+
+def test_wall_is_found_where_it_stands():
+    result = answer(StageRequest(number=4, stage="wall_finder"), wall_map(0.05))
+    assert isinstance(result, StageResult)
+    assert result.number == 4
+    assert result.error is None
+    assert isinstance(result.value, Wall)
+    np.testing.assert_allclose(
+        result.value.X_WT.translation(), [0.3, -0.2, 1.05], atol=1e-3
+    )
+
+
+def test_failure_is_a_result_with_its_reason():
+    result = answer(
+        StageRequest(number=1, stage="wall_finder"), make_map(np.zeros((3, 5)))
+    )
+    assert result.value is None
+    assert "NoWallError: the cloud has 5 finite points" in result.error
+
+
+def test_requests_to_others_are_not_answered():
+    result = answer(StageRequest(number=1, stage="wall_segmenter"), wall_map())
+    assert result.number == 0
+
+
+@pytest.mark.parametrize("name", ["width", "height", "period"])
+def test_sizes_must_be_positive(name):
+    with pytest.raises(ValueError, match=f"{name} must be > 0, got -1"):
+        make_finder(**{name: -1.0})
