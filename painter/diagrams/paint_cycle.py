@@ -12,7 +12,7 @@ from painter.diagrams.arm_model import (
     MakeArmPlant,
     MakeCollisionChecker,
 )
-from painter.diagrams.station import CHEAT_PREFIX, MakeStation
+from painter.diagrams.station import MakeStation
 from painter.planning.tile import nominal_tile_pose
 from painter.systems.camera_pose import CameraPose
 from painter.systems.map_accumulator import MapAccumulator
@@ -42,7 +42,8 @@ def MakeBrain(scenario: Scenario) -> Diagram:
     Returns:
         A diagram with the inputs STATION_TO_BRAIN and `operator` (OperatorCommand, may
         be left unconnected), the outputs BRAIN_TO_STATION, and for whoever watches:
-        `cycle_status`, `surface_map`, `wall`, `segmentation`, `program`.
+        `cycle_status`, `follower_status`, `surface_map`, `wall`, `segmentation`,
+        `program`.
     """
     builder = DiagramBuilder()
     plant = MakeArmPlant(scenario.directives)
@@ -55,9 +56,9 @@ def MakeBrain(scenario: Scenario) -> Diagram:
         "map_accumulator",
         MapAccumulator(
             config=scenario.map,
-            stereo=scenario.wall_camera.stereo,
+            intrinsics=CameraIntrinsics.from_stereo(scenario.wall_camera.stereo),
             tile=scenario.tile,
-            X_WT_expected=X_WT_expected,
+            X_WT=X_WT_expected,
             period=1.0 / scenario.wall_camera.rate,
         ),
     )
@@ -65,6 +66,8 @@ def MakeBrain(scenario: Scenario) -> Diagram:
         "wall_finder",
         WallFinder(
             X_WT_expected=X_WT_expected,
+            width=scenario.tile.width,
+            height=scenario.tile.height,
             config=scenario.segmentation,
             seed=scenario.random_seed,
             period=period,
@@ -150,6 +153,7 @@ def MakeBrain(scenario: Scenario) -> Diagram:
     builder.ExportOutput(desired_port, "arm.desired_state")
     builder.ExportOutput(follower.GetOutputPort("trigger"), "gun.trigger")
     builder.ExportOutput(cycle.GetOutputPort("cycle_status"), "cycle_status")
+    builder.ExportOutput(follower.GetOutputPort("status"), "follower_status")
     builder.ExportOutput(accumulator.GetOutputPort("surface_map"), "surface_map")
     builder.ExportOutput(wall_port, "wall")
     builder.ExportOutput(segmenter.GetOutputPort("result"), "segmentation")
@@ -164,8 +168,8 @@ class PaintCycleDiagram:
     """The whole cycle.
 
     Attributes:
-        diagram: Station and brain, connected; the brain's ports for those who watch
-            and the station's `cheat.*` are exported under their own names.
+        diagram: Station and brain, connected; all their outputs are exported under
+            their own names, and the brain's input `operator`.
         station: The station in it.
         brain: The brain in it.
     """
@@ -192,13 +196,10 @@ def MakePaintCycle(
     for name in BRAIN_TO_STATION:
         builder.Connect(brain.GetOutputPort(name), station.GetInputPort(name))
     builder.ExportInput(brain.GetInputPort("operator"), "operator")
-    for index in range(station.num_output_ports()):
-        port = station.get_output_port(index)
-        if port.get_name().startswith(CHEAT_PREFIX):
+    for system in (station, brain):
+        for index in range(system.num_output_ports()):
+            port = system.get_output_port(index)
             builder.ExportOutput(port, port.get_name())
-    for index in range(brain.num_output_ports()):
-        port = brain.get_output_port(index)
-        builder.ExportOutput(port, port.get_name())
     diagram = builder.Build()
     diagram.set_name("paint_cycle")
     return PaintCycleDiagram(diagram=diagram, station=station, brain=brain)

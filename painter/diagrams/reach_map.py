@@ -55,7 +55,12 @@ class ReachMapper:
         )
 
     def reach(
-        self, *, distance: float, shoulder_height: float, step: float = 0.05
+        self,
+        *,
+        distance: float,
+        shoulder_height: float,
+        step: float = 0.05,
+        around: float = 0.0,
     ) -> TileReach:
         """Computes the reach from one placement.
 
@@ -64,6 +69,7 @@ class ReachMapper:
             shoulder_height: Of the shoulder axis over the floor, m; the frame's mast
                 is taken as it is modelled, and moves with the shoulder.
             step: Spacing of the points on the tile, m.
+            around: How far beyond the tile to look, m.
         """
         raised = shoulder_height - self.arm.shoulder_height
         tile = placement(self._scenario.tile, distance=distance, raised=raised)
@@ -74,6 +80,7 @@ class ReachMapper:
             self.task,
             is_free=self._IsFreeBefore(distance, raised),
             step=step,
+            around=around,
         )
 
     def _IsFreeBefore(
@@ -105,6 +112,7 @@ def draw_reach_map(scenario: Scenario) -> Figure:
         distance=scenario.tile.distance,
         shoulder_height=mapper.arm.shoulder_height,
         step=0.025,
+        around=0.4,
     )
     figure = Figure(figsize=(13.0, 4.6), dpi=110, layout="constrained")
     axes = figure.subplots(1, 3, width_ratios=[1.15, 1.15, 1.0])
@@ -137,11 +145,11 @@ def draw_reach_map(scenario: Scenario) -> Figure:
 
 def _draw_shares(ax: matplotlib.axes.Axes, title: str, percent: np.ndarray) -> None:
     ax.pcolormesh(
-        DISTANCES, SHOULDER_HEIGHTS, percent, cmap=_SHARE_COLORS, vmin=0, vmax=100
+        DISTANCES, SHOULDER_HEIGHTS, percent, cmap=_SHARE_COLORS, vmin=40, vmax=100
     )
     for i, height in enumerate(SHOULDER_HEIGHTS):
         for j, distance in enumerate(DISTANCES):
-            share = int(percent[i, j])  # Rounded down: 100 is all of it.
+            share = int(percent[i, j] + 1e-9)  # Rounded down: 100 is all of it.
             ax.text(
                 distance,
                 height,
@@ -150,7 +158,7 @@ def _draw_shares(ax: matplotlib.axes.Axes, title: str, percent: np.ndarray) -> N
                 va="center",
                 fontsize=7,
                 fontweight="bold" if share == 100 else "normal",
-                color="white" if share > 55 else _INK,
+                color="white" if share > 75 else _INK,
             )
     ax.set_title(f"{title}: % of the tile", color=_INK)
     ax.set_xlabel("wall to base axis, m")
@@ -164,9 +172,6 @@ def _draw_tile(ax: matplotlib.axes.Axes, scenario: Scenario, reach: TileReach) -
     ax.pcolormesh(
         reach.x, reach.y, state, cmap=colors, vmin=-0.5, vmax=3.5, shading="nearest"
     )
-    ax.contour(
-        reach.x, reach.y, reach.camera_at, levels=[0.5], colors="white", linewidths=1.2
-    )
     ax.add_patch(
         Rectangle(
             (0, 0), tile.width, tile.height, fill=False, edgecolor=_ACCENT, linewidth=2
@@ -176,10 +181,7 @@ def _draw_tile(ax: matplotlib.axes.Axes, scenario: Scenario, reach: TileReach) -
         if np.any(state == number):
             ax.plot([], [], "s", color=colors(number), label=label)
     ax.plot([], [], color=_ACCENT, linewidth=2, label="tile")
-    ax.plot([], [], color="white", linewidth=1.5, label="camera's places")
-    ax.legend(
-        loc="lower center", ncols=3, fontsize=8, facecolor="#b8c4c6", framealpha=0.95
-    )
+    ax.legend(loc="center", fontsize=9, framealpha=0.95)
     ax.set_title(
         f"Wall at {tile.distance:.2f} m: spray {100 * reach.spray_share:.0f} %, "
         f"scan {100 * reach.scan_share:.0f} %",

@@ -1,5 +1,6 @@
 """The simulated body: plant, drives, depth camera and paint film."""
 
+import functools
 import tempfile
 from pathlib import Path
 
@@ -96,14 +97,18 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
     return diagram
 
 
+@functools.cache
+def _SceneFiles() -> tempfile.TemporaryDirectory:
+    """Returns the folder for scenes' meshes; it goes when the process ends."""
+    return tempfile.TemporaryDirectory(prefix="painter-scene-")
+
+
 def _AddScene(plant: MultibodyPlant, scenario: Scenario) -> None:
     scene = load_scene(scenario.scene, scenario.random_seed)
     X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
-    parser = Parser(plant)
-    # The parser reads a textured wall's mesh and picture into memory.
-    with tempfile.TemporaryDirectory() as folder:
-        sdf = scene_sdf(scene, Path(folder))
-        parser.AddModelsFromString(sdf, "sdf")
+    # Renderers and Meshcat read the mesh and picture of a textured wall later on.
+    folder = tempfile.mkdtemp(dir=_SceneFiles().name)
+    Parser(plant).AddModelsFromString(scene_sdf(scene, Path(folder)), "sdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("scene"), X_WS)
 
 
@@ -203,9 +208,7 @@ def _AddWallCamera(
 
     stereo = builder.AddNamedSystem(
         "stereo_camera",
-        StereoCamera(
-            config=config.stereo, seed=scenario.random_seed, period=1.0 / config.rate
-        ),
+        StereoCamera(config=config.stereo, seed=scenario.random_seed, rate=config.rate),
     )
     query_port = scene_graph.get_query_output_port()
     for renderer, port in (

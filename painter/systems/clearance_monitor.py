@@ -18,7 +18,8 @@ class ClearanceMonitor(LeafSystem):
 
     Ports:
         query_object: QueryObject of the scene graph.
-        clearance: (1,) m; negative = penetration; `horizon` = nothing nearer than that.
+        clearance: (1,) m, from the robot to what is not the robot; negative =
+            penetration, also of the robot with itself; `horizon` = nothing is nearer.
     """
 
     def __init__(self, *, robot: frozenset[GeometryId], horizon: float = 0.3) -> None:
@@ -48,5 +49,11 @@ class ClearanceMonitor(LeafSystem):
     def _CalcClearance(self, context: Context, output: BasicVector) -> None:
         query = self._query_port.Eval(context)
         pairs = query.ComputeSignedDistancePairwiseClosestPoints(self._horizon)
-        near = (p.distance for p in pairs if {p.id_A, p.id_B} & self._robot)
+        # Parts of the robot are near one another by design; they may not touch.
+        near = (
+            pair.distance
+            for pair in pairs
+            if (pair.id_A in self._robot) != (pair.id_B in self._robot)
+            or pair.distance < 0.0
+        )
         output.SetAtIndex(0, min(near, default=self._horizon))

@@ -44,7 +44,12 @@ class JointEncoder(LeafSystem):
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 2 * NQ)
         # Outputs.
-        self.DeclareVectorOutputPort("state_estimated", 2 * NQ, self._CalcEstimate)
+        self.DeclareVectorOutputPort(
+            "state_estimated",
+            2 * NQ,
+            self._CalcEstimate,
+            prerequisites_of_calc={self._state_port.ticket()},
+        )
 
     def _CalcEstimate(self, context: Context, output: BasicVector) -> None:
         state = self._state_port.Eval(context)

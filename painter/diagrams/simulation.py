@@ -1,0 +1,185 @@
+"""Runs one simulated paint cycle and keeps what it leaves."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.geometry import Meshcat
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
+
+from painter.config import Scenario
+from painter.diagrams.arm_model import GetArmKinematics, MakeArmPlant
+from painter.diagrams.paint_cycle import PaintCycleDiagram, MakePaintCycle
+from painter.planning.kinematics import ArmKinematics
+from painter.planning.spray_path import PaintProgram
+from painter.systems.paint_film import FilmState
+from painter.systems.values import CycleStatus, FollowerStatus, Phase, StageResult
+from perception.values import FloatArray, FrozenValue, SurfaceMap, WallSegmentation
+
+NQ = 5
+LOG_PERIOD = 0.01
+CLEARANCE_PERIOD = 0.05
+# Robot time between looks at the cycle from outside, s.
+WATCH_PERIOD = 0.1
+
+Watch = Callable[[float, CycleStatus, FollowerStatus], None]
+
+
+@dataclass(frozen=True, eq=False)
+class CycleLog(FrozenValue):
+    """What a simulated cycle leaves; parts it did not come to are None.
+
+    Attributes:
+        status: The cycle's last status, with all events.
+        end_time: Robot time at which the simulation stopped, s.
+        time: (n,) s, of the samples below.
+        q: (n, 5) rad, measured.
+        v: (n, 5) rad/s, measured.
+        trigger: (n,) as the gun received it.
+        X_WG: (n, 4, 4) true nozzle poses in W.
+        X_WG_desired: (n, 4, 4) nozzle poses of the desired joint state.
+        clearance_time: (k,) s.
+        clearance: (k,) m, least distance of the robot from anything else.
+        surface_map: The fused map.
+        segmentation: The wall's segmentation, or None.
+        program: The paint program, or None.
+        film: The paint film at the end.
+        look_image: (H, W, 4) uint8, colour picture of first sight, or None.
+    """
+
+    status: CycleStatus
+    end_time: float
+    time: FloatArray
+    q: FloatArray
+    v: FloatArray
+    trigger: FloatArray
+    X_WG: FloatArray
+    X_WG_desired: FloatArray
+    clearance_time: FloatArray
+    clearance: FloatArray
+    surface_map: SurfaceMap
+    segmentation: WallSegmentation | None
+    program: PaintProgram | None
+    film: FilmState
+    look_image: npt.NDArray[np.uint8] | None
+
+
+def SimulateCycle(
+    scenario: Scenario, *, meshcat: Meshcat | None = None, watch: Watch | None = None
+) -> CycleLog:
+    """Simulates a paint cycle until it is finished.
+
+    Args:
+        scenario: The job.
+        meshcat: Where to show it, or None.
+        watch: Called every WATCH_PERIOD of robot time with the time, s, and the
+            cycle's and the follower's status.
+
+    Returns:
+        What the cycle left, whether it came to DONE or not.
+    """
+    cycle = MakePaintCycle(scenario, meshcat=meshcat)
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("paint_cycle", cycle.diagram)
+    sinks = {
+        name: LogVectorOutput(cycle.diagram.GetOutputPort(port), builder, period)
+        for name, port, period in (
+            ("state", "cheat.state", LOG_PERIOD),
+            ("measured", "arm.state_estimated", LOG_PERIOD),
+            ("desired", "arm.desired_state", LOG_PERIOD),
+            ("trigger", "gun.trigger", LOG_PERIOD),
+            ("clearance", "cheat.clearance", CLEARANCE_PERIOD),
+        )
+    }
+    simulator = Simulator(builder.Build())
+    context = simulator.get_mutable_context()
+    simulator.Initialize()
+    look_image = None
+    while True:
+        simulator.AdvanceTo(context.get_time() + WATCH_PERIOD)
+        status: CycleStatus = _Evaluate(cycle, context, "cycle_status")
+        if watch is not None:
+            watch(
+                context.get_time(), status, _Evaluate(cycle, context, "follower_status")
+            )
+        if look_image is None and status.phase == Phase.SCAN:
+            look_image = _ColorImage(cycle, context)
+        if status.finished:
+            break
+    return _MakeLog(scenario, cycle, context, sinks, status, look_image)
+
+
+def _Evaluate(cycle: PaintCycleDiagram, context: Context, port: str) -> object:
+    own = cycle.diagram.GetMyContextFromRoot(context)
+    return cycle.diagram.GetOutputPort(port).Eval(own)
+
+
+def _ColorImage(cycle: PaintCycleDiagram, context: Context) -> npt.NDArray[np.uint8]:
+    return _Evaluate(cycle, context, "wall_camera.color_image").data.copy()
+
+
+def _MakeLog(
+    scenario: Scenario,
+    cycle: PaintCycleDiagram,
+    context: Context,
+    sinks: dict[str, VectorLogSink],
+    status: CycleStatus,
+    look_image: npt.NDArray[np.uint8] | None,
+) -> CycleLog:
+    logs = {name: sink.FindLog(context) for name, sink in sinks.items()}
+    data = {name: log.data().copy() for name, log in logs.items()}
+    kinematics = GetArmKinematics(MakeArmPlant(scenario.directives))
+    segmentation: StageResult = _Evaluate(cycle, context, "segmentation")
+    program: StageResult = _Evaluate(cycle, context, "program")
+    return CycleLog(
+        status=status,
+        end_time=context.get_time(),
+        time=logs["state"].sample_times().copy(),
+        q=data["measured"][:NQ].T.copy(),
+        v=data["measured"][NQ:].T.copy(),
+        trigger=data["trigger"][0].copy(),
+        X_WG=_GunPoses(kinematics, data["state"][:NQ].T),
+        X_WG_desired=_GunPoses(kinematics, data["desired"][:NQ].T),
+        clearance_time=logs["clearance"].sample_times().copy(),
+        clearance=data["clearance"][0].copy(),
+        surface_map=_Evaluate(cycle, context, "surface_map"),
+        segmentation=segmentation.value,
+        program=program.value,
+        film=_Evaluate(cycle, context, "cheat.film"),
+        look_image=look_image,
+    )
+
+
+def _GunPoses(kinematics: ArmKinematics, q: FloatArray) -> FloatArray:
+    R_WG, p_WG = kinematics.gun_poses(q)
+    poses = np.tile(np.eye(4), (len(q), 1, 1))
+    poses[:, :3, :3] = R_WG
+    poses[:, :3, 3] = p_WG
+    return poses
+
+
+def clearance_violations(
+    time: FloatArray, clearance: FloatArray, bound: float
+) -> list[tuple[float, float]]:
+    """Finds the episodes in which the robot came too close to something.
+
+    Args:
+        time: (k,) s.
+        clearance: (k,) m.
+        bound: Least distance allowed, m.
+
+    Returns:
+        (time of the least distance, that distance) of each unbroken episode below the
+        bound, in order.
+    """
+    below = np.concatenate([[False], clearance < bound, [False]])
+    starts = np.flatnonzero(below[1:] & ~below[:-1])
+    ends = np.flatnonzero(~below[1:] & below[:-1])
+    worst = [
+        start + int(np.argmin(clearance[start:end]))
+        for start, end in zip(starts, ends, strict=True)
+    ]
+    return [(float(time[index]), float(clearance[index])) for index in worst]
