@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from models.generate.arm import MODEL as ARM
-from models.generate.mesh import block, rod, write_gltf
+from models.generate.looks import LOOKS
+from models.generate.mesh import write_gltf
 from models.generate.tooling import CAMERA, FRAME, GUN
 from models.generate.urdf import write_urdf
 
@@ -16,17 +17,8 @@ def generated_files() -> dict[str, str]:
     for model in MODELS:
         files[f"{model.folder}/{model.folder}.urdf"] = write_urdf(model)
         for link in model.links:
-            pieces = []
-            for s in link.collisions:
-                if hasattr(s, "size"):
-                    pieces.append(block("paint_white", s.center, s.size))
-                else:
-                    c = list(s.center)
-                    c["xyz".index(s.axis)] -= s.length / 2
-                    pieces.append(
-                        rod("aluminium", tuple(c), s.length, s.radius, axis=s.axis)
-                    )
-            files[f"{model.folder}/meshes/{link.name}.gltf"] = write_gltf(pieces)
+            mesh = write_gltf(LOOKS[link.name]())
+            files[f"{model.folder}/meshes/{link.name}.gltf"] = mesh
     return files
 
 

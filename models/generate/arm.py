@@ -198,12 +198,16 @@ TOOL = Link(
             Cylinder(center=(0, 0, -0.051), axis="z", radius=0.028, length=0.014),
             0.2,
         ),
-        Part("bracket", Box(center=(0.05, 0, -0.051), size=(0.1, 0.036, 0.01)), 0.3),
-        Part("camera post", Box(center=(0.14, 0, 0.035), size=(0.02, 0.03, 0.03)), 0.2),
+        Part("bracket", Box(center=(0.06, 0, -0.048), size=(0.1, 0.034, 0.014)), 0.3),
+        Part(
+            "camera post", Box(center=(0.152, 0, 0.034), size=(0.03, 0.026, 0.026)), 0.2
+        ),
     ],
     collisions=[
         Cylinder(center=(0, 0, -0.051), axis="z", radius=0.028, length=0.014),
         Box(center=(0.055, 0, -0.051), size=(0.11, 0.036, 0.014)),
+        Box(center=(0.098, 0, -0.034), size=(0.024, 0.036, 0.024)),
+        Box(center=(0.152, 0, 0.034), size=(0.032, 0.028, 0.028)),
     ],
 )
 

@@ -99,6 +99,10 @@ FRAME = Model(
             ],
             collisions=[
                 Box(center=(-0.3, 0, 0.13), size=(0.8, 0.64, 0.26)),
+                Box(center=(-0.55, 0, 0.5), size=(0.26, 0.4, 0.48)),
+                Cylinder(
+                    center=(-0.24, -0.14, 0.415), axis="z", radius=0.088, length=0.31
+                ),
                 Box(center=(0, 0, 0.56), size=(0.08, 0.08, 0.6)),
             ],
         )

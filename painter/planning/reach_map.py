@@ -63,9 +63,10 @@ class TileReach(FrozenValue):
     """What one placement reaches of a tile; row 0 at the bottom.
 
     Attributes:
-        x: (nx,) m, columns in T, from -margin to width + margin.
+        x: (nx,) m, columns in T, over the tile and what is around it.
         y: (ny,) m, rows in T, likewise.
-        on_tile: (ny, nx); True on the tile, False on the margin around it.
+        on_tile: (ny, nx); True on the tile.
+        to_see: (ny, nx); True on the tile and the margin that pictures are to reach.
         sprayed: (ny, nx); the nozzle can stand before the point.
         camera_at: (ny, nx); the camera can stand before the point.
         seen: (ny, nx); the point is in a picture from such a place.
@@ -74,6 +75,7 @@ class TileReach(FrozenValue):
     x: FloatArray
     y: FloatArray
     on_tile: BoolArray
+    to_see: BoolArray
     sprayed: BoolArray
     camera_at: BoolArray
     seen: BoolArray
@@ -86,7 +88,7 @@ class TileReach(FrozenValue):
     @property
     def scan_share(self) -> float:
         """Share of the tile and its margin that can be seen."""
-        return float(self.seen.mean())
+        return float(self.seen[self.to_see].mean())
 
 
 def tile_reach(
@@ -97,6 +99,7 @@ def tile_reach(
     *,
     is_free: Callable[[FloatArray], BoolArray],
     step: float = 0.05,
+    around: float = 0.0,
 ) -> TileReach:
     """Computes what the arm reaches of a tile from where it stands.
 
@@ -107,9 +110,10 @@ def tile_reach(
         task: What is to be done.
         is_free: Tells which rows of positions (n, 5), rad, are free of collisions.
         step: Spacing of the points, m; points lie on the tile's edges.
+        around: How far beyond the tile to look, m; at least the task's margin.
     """
-    x, on_x = _ticks(tile.width, task.margin, step)
-    y, on_y = _ticks(tile.height, task.margin, step)
+    around = max(around, task.margin)
+    x, y = _ticks(tile.width, around, step), _ticks(tile.height, around, step)
     shape = (len(y), len(x))
     X_WT = nominal_tile_pose(tile)
     ahead_W = -X_WT.rotation().col(2)
@@ -127,7 +131,8 @@ def tile_reach(
     return TileReach(
         x=x,
         y=y,
-        on_tile=on_y[:, None] & on_x,
+        on_tile=_within(x, y, tile, 0.0),
+        to_see=_within(x, y, tile, task.margin),
         sprayed=reached(arm.solve, task.standoff),
         camera_at=camera_at,
         seen=(sees_y.astype(int) @ camera_at.astype(int) @ sees_x.astype(int)) > 0,
@@ -145,11 +150,19 @@ def placement(tile: TileConfig, *, distance: float, raised: float) -> TileConfig
     return dataclasses.replace(tile, distance=distance, bottom=tile.bottom - raised)
 
 
-def _ticks(length: float, margin: float, step: float) -> tuple[FloatArray, BoolArray]:
-    """Evenly spaced coordinates with both edges among them, and which are within."""
+def _ticks(length: float, around: float, step: float) -> FloatArray:
+    """Evenly spaced coordinates with both edges, and both outer ends, among them."""
     steps = round(length / step)
-    outside = math.ceil(margin / step)
+    outside = math.ceil(around / step)
     ticks = np.arange(-outside, steps + outside + 1) * (length / steps)
-    inside = np.zeros(len(ticks), dtype=np.bool_)
-    inside[outside : outside + steps + 1] = True
-    return np.clip(ticks, -margin, length + margin), inside
+    clipped: FloatArray = np.clip(ticks, -around, length + around)
+    return clipped
+
+
+def _within(x: FloatArray, y: FloatArray, tile: TileConfig, margin: float) -> BoolArray:
+    # Rounding moves a point on the edge by less than this.
+    margin += 1e-9
+    on_x = (x >= -margin) & (x <= tile.width + margin)
+    on_y = (y >= -margin) & (y <= tile.height + margin)
+    within: BoolArray = on_y[:, None] & on_x
+    return within
