@@ -22,6 +22,7 @@ from painter.systems.path_follower import PathFollower
 from painter.systems.spray_path_planner import SprayPathPlanner
 from painter.systems.wall_finder import WallFinder
 from painter.systems.wall_segmenter import WallSegmenter
+from perception.depth import CameraIntrinsics
 
 # Inputs and outputs of the brain that meet the station's ports of the same name.
 STATION_TO_BRAIN = (

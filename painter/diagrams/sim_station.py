@@ -1,5 +1,6 @@
 """The simulated body: plant, drives, depth camera and paint film."""
 
+import dataclasses
 import functools
 import tempfile
 from pathlib import Path
@@ -27,7 +28,7 @@ from pydrake.systems.primitives import (
     DiscreteDerivative,
     SharedPointerSystem,
 )
-from pydrake.systems.sensors import CameraInfo, RgbdSensor
+from pydrake.systems.sensors import RgbdSensor
 
 from painter.config import Scenario
 from painter.diagrams.arm_model import (
@@ -45,7 +46,8 @@ from painter.systems.gun_pose import GunPose
 from painter.systems.joint_encoder import JointEncoder
 from painter.systems.paint_film import PaintFilm
 from painter.systems.simulated_drives import SimulatedDrives
-from painter.systems.stereo_camera import StereoCamera
+from painter.systems.stereo_camera import StereoCamera, render_camera_info
+from perception.depth import CameraIntrinsics
 
 NQ = 5
 # Renderers: what light sees, and the same with panes of glass opaque.
@@ -80,8 +82,8 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
     arm = plant.GetModelInstanceByName("arm")
     plant.SetDefaultPositions(arm, np.deg2rad(scenario.motion.home_deg))
     _AddDrives(builder, plant, scenario)
-    _AddWallCamera(builder, plant, scene_graph, scenario)
-    _AddGun(builder, plant, scenario)
+    camera = _AddWallCamera(builder, plant, scene_graph, scenario)
+    _AddGun(builder, plant, scenario, camera)
     monitor = builder.AddNamedSystem(
         "clearance_monitor", ClearanceMonitor(robot=_RobotGeometries(plant))
     )
@@ -174,7 +176,7 @@ def _AddWallCamera(
     plant: MultibodyPlant,
     scene_graph: SceneGraph,
     scenario: Scenario,
-) -> None:
+) -> StereoCamera:
     """Adds the renderers, the ideal cameras and the stereo camera's errors."""
     config = scenario.wall_camera
     for name in (SCENE_RENDERER, GLASS_RENDERER):
@@ -187,22 +189,25 @@ def _AddWallCamera(
     X_BC = mount.GetFixedPoseInBodyFrame() @ X_error
     frame_id = plant.GetBodyFrameIdOrThrow(mount.body().index())
 
-    def core(renderer: str, width: int, height: int) -> RenderCameraCore:
-        focal = 0.5 * width / np.tan(0.5 * np.deg2rad(config.stereo.hfov_deg))
-        info = CameraInfo(
-            width, height, focal, focal, 0.5 * width - 0.5, 0.5 * height - 0.5
+    depth_intrinsics = CameraIntrinsics.from_stereo(config.stereo)
+    color_intrinsics = CameraIntrinsics.from_stereo(
+        dataclasses.replace(
+            config.stereo, width=config.color_width, height=config.color_height
         )
+    )
+
+    def core(renderer: str, intrinsics: CameraIntrinsics) -> RenderCameraCore:
         return RenderCameraCore(
-            renderer, info, ClippingRange(0.02, 20.0), RigidTransform()
+            renderer,
+            render_camera_info(intrinsics),
+            ClippingRange(0.02, 20.0),
+            RigidTransform(),
         )
 
     def sensor(renderer: str) -> RgbdSensor:
-        color = ColorRenderCamera(
-            core(GLASS_RENDERER, config.color_width, config.color_height)
-        )
+        color = ColorRenderCamera(core(GLASS_RENDERER, color_intrinsics))
         depth = DepthRenderCamera(
-            core(renderer, config.stereo.width, config.stereo.height),
-            DepthRange(0.05, 15.0),
+            core(renderer, depth_intrinsics), DepthRange(0.05, 15.0)
         )
         return RgbdSensor(frame_id, X_BC, color, depth)
 
@@ -221,9 +226,15 @@ def _AddWallCamera(
     builder.ExportOutput(camera.color_image_output_port(), "wall_camera.color_image")
     for port in ("depth_image", "image_time"):
         builder.ExportOutput(stereo.GetOutputPort(port), f"wall_camera.{port}")
+    return stereo
 
 
-def _AddGun(builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario) -> None:
+def _AddGun(
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    scenario: Scenario,
+    camera: StereoCamera,
+) -> None:
     """Adds the paint film on the scene's true surface."""
     arm = plant.GetModelInstanceByName("arm")
     scene = load_scene(scenario.scene, scenario.random_seed)
@@ -250,5 +261,6 @@ def _AddGun(builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario) 
     builder.Connect(plant.get_state_output_port(arm), gun.GetInputPort("state"))
     builder.Connect(gun.GetOutputPort("X_WG"), film.GetInputPort("X_WG"))
     builder.ExportInput(film.GetInputPort("trigger"), "gun.trigger")
+    builder.ConnectInput("gun.trigger", camera.GetInputPort("gun_trigger"))
     builder.ExportOutput(gun.GetOutputPort("X_WG"), "cheat.X_WG")
     builder.ExportOutput(film.GetOutputPort("film"), "cheat.film")

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
 from painter.config import Scenario
 from painter.diagrams.arm_model import GetArmKinematics, MakeArmPlant
-from painter.diagrams.paint_cycle import PaintCycleDiagram, MakePaintCycle
+from painter.diagrams.paint_cycle import MakePaintCycle, PaintCycleDiagram
 from painter.planning.kinematics import ArmKinematics
 from painter.planning.spray_path import PaintProgram
 from painter.systems.paint_film import FilmState

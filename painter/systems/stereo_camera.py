@@ -1,5 +1,6 @@
 """Simulated D435: takes pictures through the stereo model at its own rate."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,9 @@ from perception.config import StereoConfig
 from perception.depth import CameraIntrinsics
 from perception.stereo import StereoModel
 from perception.values import FrozenValue
+
+# How long paint mist hangs before the lens after the gun has closed, s (assumption).
+MIST_TIME = 2.0
 
 
 def render_camera_info(intrinsics: CameraIntrinsics) -> CameraInfo:
@@ -48,11 +52,13 @@ class DepthPicture(FrozenValue):
         depth_mm: (H, W) uint16, mm, 0 = no return.
         time: When it was taken, s; -1 = none yet.
         number: Pictures taken so far.
+        spray_time: When the gun was last seen spraying, s.
     """
 
     depth_mm: npt.NDArray[np.uint16]
     time: float = -1.0
     number: int = 0
+    spray_time: float = -math.inf
 
 
 class StereoCamera(LeafSystem):
@@ -64,7 +70,7 @@ class StereoCamera(LeafSystem):
         input_ports:
         - ideal_depth
         - ideal_depth_with_glass
-        - capture
+        - gun_trigger
         output_ports:
         - depth_image
         - image_time
@@ -73,8 +79,8 @@ class StereoCamera(LeafSystem):
         ideal_depth: ImageDepth32F, m, panes of glass left out; 0 = too near, inf = too
             far.
         ideal_depth_with_glass: The same with the panes as solid bodies.
-        capture: (1,); 0 = take no picture, which spares the rendering. May be left
-            unconnected: pictures are then always taken.
+        gun_trigger: (1,); while the gun sprays and MIST_TIME after, the lens cover is
+            shut and no picture is taken. May be left unconnected: always open.
         depth_image: ImageDepth16U, mm, 0 = no return; the last picture, all 0 before
             the first.
         image_time: (1,) s, when that was taken; -1 before the first.
@@ -105,7 +111,7 @@ class StereoCamera(LeafSystem):
         self._glass_port = self.DeclareAbstractInputPort(
             "ideal_depth_with_glass", image
         )
-        self._capture_port = self.DeclareVectorInputPort("capture", 1)
+        self._trigger_port = self.DeclareVectorInputPort("gun_trigger", 1)
         # State.
         blank = np.zeros((config.height, config.width), dtype=np.uint16)
         self._picture_index = self.DeclareAbstractState(Value(DepthPicture(blank)))
@@ -136,21 +142,28 @@ class StereoCamera(LeafSystem):
         output.SetAtIndex(0, self._Picture(context).time)
 
     def _UpdatePicture(self, context: Context, state: State) -> EventStatus:
-        if self._capture_port.HasValue(context) and (
-            self._capture_port.Eval(context)[0] == 0.0
-        ):
+        last = self._Picture(context)
+        now = context.get_time()
+        if self._trigger_port.HasValue(context) and self._trigger_port.Eval(context)[0]:
+            self._SetPicture(state, last.replace(spray_time=now))
+            return EventStatus.Succeeded()
+        if now < last.spray_time + MIST_TIME:
             return EventStatus.DidNothing()
-        number = self._Picture(context).number + 1
+        number = last.number + 1
         depth, depth_with_glass = (
             EvalAs(port, context, ImageDepth32F).data[:, :, 0]
             for port in (self._depth_port, self._glass_port)
         )
-        picture = DepthPicture(
+        picture = last.replace(
             depth_mm=self._model.measure(
                 depth, depth_with_glass, np.random.default_rng([self._seed, number])
             ),
-            time=context.get_time(),
+            time=now,
             number=number,
         )
-        state.get_mutable_abstract_state(int(self._picture_index)).set_value(picture)
+        self._SetPicture(state, picture)
         return EventStatus.Succeeded()
+
+    def _SetPicture(self, state: State, picture: DepthPicture) -> None:
+        index = int(self._picture_index)
+        state.get_mutable_abstract_state(index).set_value(picture)

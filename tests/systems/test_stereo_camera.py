@@ -19,7 +19,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import ImageDepth32F, RgbdSensor
 
-from painter.systems.stereo_camera import StereoCamera, render_camera_info
+from painter.systems.stereo_camera import MIST_TIME, StereoCamera, render_camera_info
 from perception.config import StereoConfig
 from perception.depth import CameraIntrinsics, backproject
 
@@ -32,14 +32,14 @@ def ideal(depth: float, config: StereoConfig = SMALL) -> ImageDepth32F:
     return image
 
 
-def make_simulator(*, rate: float = 10.0, seed: int = 1, capture=None) -> Simulator:
+def make_simulator(*, rate: float = 10.0, seed: int = 1, trigger=None) -> Simulator:
     dut = StereoCamera(config=SMALL, seed=seed, rate=rate)
     simulator = Simulator(dut)
     context = simulator.get_mutable_context()
     dut.GetInputPort("ideal_depth").FixValue(context, ideal(0.8))
     dut.GetInputPort("ideal_depth_with_glass").FixValue(context, ideal(0.8))
-    if capture is not None:
-        dut.GetInputPort("capture").FixValue(context, [capture])
+    if trigger is not None:
+        dut.GetInputPort("gun_trigger").FixValue(context, [trigger])
     return simulator
 
 
@@ -87,16 +87,20 @@ def test_a_replay_repeats_every_picture():
     assert (outputs(other)[0] != before[0]).mean() > 0.2
 
 
-def test_without_capture_the_last_picture_is_kept():
-    simulator = make_simulator(capture=1.0)
+def test_no_picture_while_the_gun_sprays_and_its_mist_hangs():
+    simulator = make_simulator(trigger=0.0)
     simulator.AdvanceTo(0.05)
     first, _ = outputs(simulator)
-    context = simulator.get_mutable_context()
-    simulator.get_system().GetInputPort("capture").FixValue(context, [0.0])
-    simulator.AdvanceTo(0.35)
+    trigger = simulator.get_system().GetInputPort("gun_trigger")
+    trigger.FixValue(simulator.get_mutable_context(), [1.0])
+    simulator.AdvanceTo(1.05)
+    trigger.FixValue(simulator.get_mutable_context(), [0.0])
+    simulator.AdvanceTo(1.05 + 0.9 * MIST_TIME)
     image, time = outputs(simulator)
     assert time == 0.0
     np.testing.assert_array_equal(image, first)
+    simulator.AdvanceTo(1.25 + MIST_TIME)
+    assert outputs(simulator)[1] > 1.0 + MIST_TIME
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, math.inf])
