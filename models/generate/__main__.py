@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from models.generate.arm import MODEL as ARM
-from models.generate.looks import LOOKS
-from models.generate.mesh import write_gltf
-from models.generate.tooling import CAMERA, FRAME, GUN
-from models.generate.urdf import write_urdf
+from painter_models.generate.arm import MODEL as ARM
+from painter_models.generate.looks import LOOKS
+from painter_models.generate.mesh import write_gltf
+from painter_models.generate.tooling import CAMERA, FRAME, GUN
+from painter_models.generate.urdf import write_urdf
 
 MODELS = (ARM, GUN, CAMERA, FRAME)
 

@@ -3,8 +3,8 @@
 Every figure here is explained in models/arm/README.md.
 """
 
-from models.generate.solids import Box, Cylinder, Part
-from models.generate.urdf import Joint, Link, Model
+from painter_models.generate.solids import Box, Cylinder, Part
+from painter_models.generate.urdf import Joint, Link, Model
 
 BASE_HEIGHT = 0.18  # Mounting face to the top of the yaw drive.
 SHOULDER_HEIGHT = 0.16  # From there to the shoulder axis.

@@ -2,9 +2,9 @@
 
 import math
 
-from models.generate.arm import FOREARM, SIDE, UPPER_ARM
-from models.generate.mesh import Piece, Point, block, hose, plate, rod, turned
-from models.generate.tooling import MAST_TOP
+from painter_models.generate.arm import FOREARM, SIDE, UPPER_ARM
+from painter_models.generate.mesh import Piece, Point, block, hose, plate, rod, turned
+from painter_models.generate.tooling import MAST_TOP
 
 Outline = list[tuple[float, float]]
 

@@ -284,7 +284,9 @@ def write_gltf(pieces: list[Piece]) -> str:
         return len(accessors) - 1
 
     def y_up(points: np.ndarray) -> np.ndarray:
-        return np.ascontiguousarray(points[:, [0, 2, 1]] * [1, 1, -1], dtype="<f4")
+        # Rounded, so that every machine writes the same file; + 0.0 makes -0.0 one.
+        turned_up = np.round(points[:, [0, 2, 1]] * [1, 1, -1], 6) + 0.0
+        return np.ascontiguousarray(turned_up, dtype="<f4")
 
     for name in names:
         chosen = [piece for piece in pieces if piece.material == name]
@@ -305,7 +307,7 @@ def write_gltf(pieces: list[Piece]) -> str:
             }
         )
     document = {
-        "asset": {"version": "2.0", "generator": "python -m models.generate"},
+        "asset": {"version": "2.0", "generator": "python -m painter_models.generate"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],

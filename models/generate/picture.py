@@ -1,4 +1,4 @@
-"""Renders models/arm/arm.png: `python -m models.generate.picture`."""
+"""Renders models/arm/arm.png: `python -m painter_models.generate.picture`."""
 
 from pathlib import Path
 

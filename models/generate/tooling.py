@@ -5,8 +5,8 @@ Every figure here is explained in the README of the model's folder.
 
 import math
 
-from models.generate.solids import Box, Cylinder, Part
-from models.generate.urdf import FixedFrame, Link, Model
+from painter_models.generate.solids import Box, Cylinder, Part
+from painter_models.generate.urdf import FixedFrame, Link, Model
 
 # Turns a frame whose x looks ahead and z up into one whose z looks ahead, y down.
 OPTICAL_RPY = (-math.pi / 2, 0.0, -math.pi / 2)

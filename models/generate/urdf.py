@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from models.generate.solids import Part, Shape, central_inertia
+from painter_models.generate.solids import Part, Shape, central_inertia
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +85,7 @@ def write_urdf(model: Model) -> str:
     blocks += [_frame(frame) for frame in model.frames]
     return (
         '<?xml version="1.0"?>\n'
-        "<!-- Written by `python -m models.generate`: edit the description there. -->\n"
+        "<!-- Written by `python -m painter_models.generate`: edit that. -->\n"
         f'<robot name="{model.folder}" xmlns:drake="http://drake.mit.edu">\n'
         + "".join(blocks)
         + "</robot>\n"
