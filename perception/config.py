@@ -95,7 +95,7 @@ class SegmentationConfig:
     min_region_area: float = 0.005
     wall_distance_tolerance: float = 0.15
     wall_angle_tolerance_deg: float = 10.0
-    min_wall_share: float = 0.05
+    min_wall_share: float = 0.1
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""

@@ -98,7 +98,14 @@ def draw_labels(ax: Axes, result: WallSegmentation) -> None:
         vmax=count + 0.5,
         **_placement(result),
     )
-    ax.legend(handles=handles, fontsize=7, loc="lower left", framealpha=0.9)
+    ax.legend(
+        handles=handles,
+        fontsize=7,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.12),
+        ncols=3,
+        frameon=False,
+    )
     _finish(ax, result, f"Labels ({count} regions by area)")
 
 

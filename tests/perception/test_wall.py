@@ -86,7 +86,7 @@ def test_plane_of_few_points_is_no_wall():
         ],
         axis=1,
     )
-    with pytest.raises(NoWallError, match="5% or more"):
+    with pytest.raises(NoWallError, match="10% or more"):
         find(points)
 
 
