@@ -150,17 +150,40 @@ class MotionConfig:
     Attributes:
         limit_share: Share of the joints' velocity and acceleration limits that plans
             may use, so that tracking has something in hand.
-        clearance: Least distance of the arm and gun from everything else, m.
+        clearance: Least distance of the arm and gun from wall and obstacles, m.
+        floor_clearance: Least distance from the floor and the arm's own frame, m; they
+            are known better than what was mapped, and the gun turns close to the floor.
         sample_period: Spacing of a planned motion's samples, s.
+        wall_keepout: The arm stays this far and the clearance from the wall until the
+            wall has been scanned, m; what hangs on it is not known before. On the lower
+            rows of a scan the bent elbow leaves no more than 0.10 m.
+        home_deg: Joint angles, base yaw first, of the folded pose where every program
+            ends and over which detours go: gun ahead, half a metre off the wall.
     """
 
     limit_share: float = 0.9
     clearance: float = 0.04
+    floor_clearance: float = 0.01
     sample_period: float = 0.01
+    wall_keepout: float = 0.10
+    home_deg: list[float] = dataclasses.field(
+        default_factory=lambda: [0.0, -111.0, 155.0, -44.0, 0.0]
+    )
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
-        check_positive("motion", **dataclasses.asdict(self))
+        values = dataclasses.asdict(self)
+        home = values.pop("home_deg")
+        check_positive("motion", **values)
+        if self.floor_clearance > self.clearance:
+            raise ValueError(
+                f"motion.floor_clearance must be <= motion.clearance "
+                f"({self.clearance!r} m), got {self.floor_clearance!r}."
+            )
+        if len(home) != 5 or not all(abs(angle) <= 180.0 for angle in home):
+            raise ValueError(
+                f"motion.home_deg must have 5 angles of -180 to 180, got {home!r}."
+            )
         if self.limit_share > 1.0:
             raise ValueError(
                 f"motion.limit_share must be <= 1, got {self.limit_share!r}."

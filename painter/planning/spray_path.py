@@ -74,6 +74,19 @@ class Motion(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False)
+class SkippedStroke(FrozenValue):
+    """A stroke, or a part of one, that is not in the program.
+
+    Attributes:
+        stroke: What was left out.
+        reason: Why, in one line.
+    """
+
+    stroke: Stroke
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
 class PaintProgram(FrozenValue):
     """What the robot is to do with one tile, ready to be approved and executed.
 
@@ -83,6 +96,8 @@ class PaintProgram(FrozenValue):
         X_WT: Tile frame T in W, as segmented.
         standoff: Nozzle to wall, m.
         nominal_thickness: Film that the raster aims at, m (wet).
+        paint_volume: Paint that leaves the gun, m³.
+        skipped: Strokes, or parts of them, that the arm cannot do.
     """
 
     strokes: tuple[Stroke, ...]
@@ -90,3 +105,5 @@ class PaintProgram(FrozenValue):
     X_WT: RigidTransform
     standoff: float
     nominal_thickness: float
+    paint_volume: float = 0.0
+    skipped: tuple[SkippedStroke, ...] = ()

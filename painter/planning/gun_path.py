@@ -1,0 +1,223 @@
+"""Paths of the gun's nozzle in front of the wall, timed by construction.
+
+The gun stays square to the wall, so a path is the nozzle's position in T over time.
+Passes run at constant speed; blends join two passes. A blend's duration is the shortest
+that the joints allow, found on densely evaluated inverse kinematics instead of being
+left to a time parametriser, which can fail without saying so.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from painter.planning.blend import MovingState, evaluate
+from painter.planning.joint_motion import SEARCH_SHARE, shortest
+from painter.planning.kinematics import ArmKinematics, ArmLimits
+from perception.values import BoolArray, FloatArray, FrozenValue
+
+_SAMPLES = 49  # Of a blend, where its joint rates are looked at.
+_LONGEST = 8.0  # s, of a blend.
+_FASTEST = 4.0  # m/s, mean speed of a blend that no arm of this size exceeds.
+_DIFFERENCE = 1e-3  # s, half width of the central differences for joint states.
+
+
+@dataclass(frozen=True, eq=False)
+class Pass(FrozenValue):
+    """A straight piece of path at constant speed.
+
+    Attributes:
+        p0_TG: (3,) m, in T, its start.
+        v_TG: (3,) m/s, in T.
+        duration: s.
+    """
+
+    p0_TG: FloatArray
+    v_TG: FloatArray
+    duration: float
+
+    @classmethod
+    def between(cls, p0_TG: FloatArray, p1_TG: FloatArray, speed: float) -> "Pass":
+        """Makes the pass between two points (3,), m, in T, at `speed`, m/s.
+
+        Raises:
+            ValueError: The points are one and the same.
+        """
+        travel = np.asarray(p1_TG, dtype=float) - p0_TG
+        length = float(np.linalg.norm(travel))
+        if length == 0.0:
+            raise ValueError("a pass must have a length > 0 m, got 0.")
+        start = np.array(p0_TG, dtype=float)
+        return cls(start, travel * (speed / length), length / speed)
+
+    @property
+    def start(self) -> MovingState:
+        """Nozzle in T at its start."""
+        return MovingState.steady(self.p0_TG, self.v_TG)
+
+    @property
+    def end(self) -> MovingState:
+        """Nozzle in T at its end."""
+        return MovingState.steady(self.p0_TG + self.duration * self.v_TG, self.v_TG)
+
+    def p_TG(self, time: FloatArray) -> FloatArray:
+        """Returns (n, 3) m, in T, at `time` (n,) s."""
+        return self.p0_TG + np.asarray(time)[:, None] * self.v_TG
+
+
+@dataclass(frozen=True, eq=False)
+class ToolBlend(FrozenValue):
+    """A blend of the nozzle's position, over an obstacle if it has a hop.
+
+    Attributes:
+        start: Nozzle in T at its start.
+        end: Nozzle in T at its end.
+        duration: s.
+        hop: How far the gun draws back from the wall on the way, m.
+        rise: Share of the duration for drawing back, and again for coming down.
+    """
+
+    start: MovingState
+    end: MovingState
+    duration: float
+    hop: float = 0.0
+    rise: float = 0.5
+
+    def p_TG(self, time: FloatArray) -> FloatArray:
+        """Returns (n, 3) m, in T, at `time` (n,) s."""
+        s = np.asarray(time) / self.duration
+        p_TG, _ = evaluate(self.start, self.end, np.array([self.duration]), s)
+        p_TG[..., 2] += _hop_height(s, self.hop, self.rise)
+        return np.asarray(p_TG[0])
+
+
+class ToolPath(Protocol):
+    """What `Pass` and `ToolBlend` have in common."""
+
+    @property
+    def duration(self) -> float:
+        """Length in time, s."""
+
+    def p_TG(self, time: FloatArray) -> FloatArray:
+        """Returns (n, 3) m, in T, at `time` (n,) s."""
+
+
+@dataclass(frozen=True, eq=False)
+class SquareGun(FrozenValue):
+    """Inverse kinematics with the gun square to one wall, on one arm configuration.
+
+    Attributes:
+        kinematics: Of the arm.
+        X_WT: Tile frame T in W.
+    """
+
+    kinematics: ArmKinematics
+    X_WT: RigidTransform
+
+    def solve(self, p_TGs: FloatArray) -> FloatArray:
+        """Returns joint angles with the nozzle at points before the wall.
+
+        Args:
+            p_TGs: (..., 3) m, in T.
+
+        Returns:
+            (..., 5) rad, elbow up; NaN where the arm does not reach.
+        """
+        p_WGs = (self.X_WT @ np.reshape(p_TGs, (-1, 3)).T).T
+        axis_W = -self.X_WT.rotation().col(2)
+        q = self.kinematics.solve(p_WGs, axis_W)
+        return q.reshape((*np.shape(p_TGs)[:-1], 5))
+
+    def joint_state(self, nozzle: MovingState) -> MovingState:
+        """Returns the joints' state for a nozzle in T at constant velocity.
+
+        NaN where the arm does not reach. The rates are central differences.
+        """
+        times = np.array([-_DIFFERENCE, 0.0, _DIFFERENCE])
+        before, q, after = self.solve(nozzle.x + times[:, None] * nozzle.v)
+        return MovingState(
+            q,
+            (after - before) / (2.0 * _DIFFERENCE),
+            (after - 2.0 * q + before) / _DIFFERENCE**2,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ToolMove(FrozenValue):
+    """A `Segment` that follows a tool path.
+
+    Attributes:
+        path: The nozzle over time.
+        gun: Turns it into joint angles.
+    """
+
+    path: ToolPath
+    gun: SquareGun
+
+    @property
+    def duration(self) -> float:
+        """Length in time, s."""
+        return self.path.duration
+
+    def q(self, time: FloatArray) -> FloatArray:
+        """See `Segment.q`."""
+        return self.gun.solve(self.path.p_TG(time))
+
+
+def fastest_tool_blend(
+    start: MovingState,
+    end: MovingState,
+    *,
+    gun: SquareGun,
+    limits: ArmLimits,
+    hop: float = 0.0,
+    rise: float = 0.5,
+) -> ToolBlend | None:
+    """Finds the tool blend of shortest duration that the joints can follow.
+
+    Args:
+        start: Nozzle in T at the start, at constant velocity.
+        end: Nozzle in T at the end, at constant velocity.
+        gun: Inverse kinematics.
+        limits: Of the joints, as far as the plan may use them.
+        hop: See `ToolBlend`.
+        rise: See `ToolBlend`.
+
+    Returns:
+        The blend, or None if no duration up to 8 s keeps reach and limits.
+    """
+    step = 1.0 / (_SAMPLES - 1)
+    # One sample before and one after, on the passes that the blend joins.
+    s = np.linspace(-step, 1.0 + step, _SAMPLES + 2)
+
+    def allowed(durations: FloatArray) -> BoolArray:
+        p_TGs, _ = evaluate(start, end, durations, s)
+        p_TGs[..., 2] += _hop_height(s, hop, rise)
+        q = gun.solve(p_TGs)
+        dt = (durations * step)[:, None, None]
+        v = (q[:, 2:] - q[:, :-2]) / (2.0 * dt)
+        a = (q[:, 2:] - 2.0 * q[:, 1:-1] + q[:, :-2]) / dt**2
+        with np.errstate(invalid="ignore"):
+            keeps = np.abs(v) <= SEARCH_SHARE * limits.v_max
+            keeps &= np.abs(a) <= SEARCH_SHARE * limits.a_max
+        return np.asarray(keeps.all(axis=(1, 2)) & limits.contains(q).all(axis=1))
+
+    travel = float(np.linalg.norm(end.x - start.x))
+    durations = np.geomspace(max(0.02, travel / _FASTEST), _LONGEST, 28)
+    speed = float(np.linalg.norm(start.v + end.v)) / 2.0
+    if speed > 0.0 and travel > 0.0:
+        # Going straight on at constant speed needs no acceleration of the gun at all.
+        durations = np.sort(np.append(durations, travel / speed))
+    duration = shortest(allowed, durations)
+    return None if duration is None else ToolBlend(start, end, duration, hop, rise)
+
+
+def _hop_height(s: FloatArray, hop: float, rise: float) -> FloatArray:
+    """Returns the hop's height (n,), m, at shares `s` (n,): up, along, down again."""
+
+    def smooth_step(u: FloatArray) -> FloatArray:
+        u = np.clip(u, 0.0, 1.0)
+        return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+
+    return hop * smooth_step(s / rise) * smooth_step((1.0 - s) / rise)

@@ -1,0 +1,180 @@
+"""Joint-space motion: blends within the joints' limits, and chaining into a Motion."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from painter.planning.blend import MovingState, evaluate, plateaus
+from painter.planning.kinematics import ArmLimits
+from painter.planning.spray_path import Motion
+from perception.values import BoolArray, FloatArray, FrozenValue
+
+_POSITION_MARGIN = 0.02  # rad, kept off a joint's end by plans.
+_SHORTEST_MOVE = 0.05  # s; a move of no length still lasts a few samples.
+_LONGEST_BLEND = 8.0  # s
+_SAMPLES = 33  # Of a blend, where its rates are looked at.
+# The peak between two samples, and the spline through a motion's samples, may exceed
+# what is seen at them a little.
+SEARCH_SHARE = 0.96
+
+
+class Segment(Protocol):
+    """A piece of motion; chained pieces meet with equal q, its rate and its second."""
+
+    @property
+    def duration(self) -> float:
+        """Length in time, s."""
+
+    def q(self, time: FloatArray) -> FloatArray:
+        """Returns (n, 5) rad at `time` (n,) s from the segment's own start."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointBlend(FrozenValue):
+    """A `Segment` that blends two joint states; see `painter.planning.blend`.
+
+    Attributes:
+        start: Joint state at its start, rad.
+        end: Joint state at its end, rad.
+        duration: s.
+    """
+
+    start: MovingState
+    end: MovingState
+    duration: float
+
+    def q(self, time: FloatArray) -> FloatArray:
+        """See `Segment.q`."""
+        s = np.asarray(time) / self.duration
+        q, _ = evaluate(self.start, self.end, np.array([self.duration]), s)
+        return np.asarray(q[0])
+
+
+def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
+    """Returns what a plan may use of the joints' limits.
+
+    Args:
+        limits: Of the joints.
+        share: Of velocities and accelerations; positions keep 0.02 rad off their ends.
+    """
+    return limits.replace(
+        q_min=limits.q_min + _POSITION_MARGIN,
+        q_max=limits.q_max - _POSITION_MARGIN,
+        v_max=share * limits.v_max,
+        a_max=share * limits.a_max,
+    )
+
+
+def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointBlend:
+    """Makes the fastest straight move from rest to rest.
+
+    Args:
+        q0: (5,) rad.
+        q1: (5,) rad.
+        limits: Of the joints, as far as the plan may use them.
+    """
+    start, end = MovingState.at_rest(q0), MovingState.at_rest(q1)
+    second = np.ones(1)
+    first, _ = plateaus(start, end, second)
+    _, rate = evaluate(start, end, second, np.array([0.5]))  # Fastest half way.
+    by_velocity = np.abs(rate[0, 0]) / (SEARCH_SHARE * limits.v_max)
+    by_acceleration = np.sqrt(np.abs(first[0]) / (SEARCH_SHARE * limits.a_max))
+    duration = max(_SHORTEST_MOVE, float(np.max([by_velocity, by_acceleration])))
+    return JointBlend(start, end, duration)
+
+
+def fastest_joint_blend(
+    start: MovingState, end: MovingState, limits: ArmLimits
+) -> JointBlend | None:
+    """Finds the joint blend of shortest duration that keeps the limits.
+
+    Args:
+        start: Joint state at the start.
+        end: Joint state at the end.
+        limits: Of the joints, as far as the plan may use them.
+
+    Returns:
+        The blend, or None if no duration up to 8 s keeps them.
+    """
+    s = np.linspace(0.0, 1.0, _SAMPLES)
+
+    def allowed(durations: FloatArray) -> BoolArray:
+        first, second = plateaus(start, end, durations)
+        q, v = evaluate(start, end, durations, s)
+        peak = np.maximum(np.abs(first), np.abs(second))
+        keeps = (peak <= SEARCH_SHARE * limits.a_max).all(axis=1)
+        keeps &= (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
+        return np.asarray(keeps & limits.contains(q).all(axis=1))
+
+    duration = shortest(allowed, np.geomspace(_SHORTEST_MOVE, _LONGEST_BLEND, 60))
+    return None if duration is None else JointBlend(start, end, duration)
+
+
+def shortest(
+    allowed: Callable[[FloatArray], BoolArray], durations: FloatArray
+) -> float | None:
+    """Finds the shortest duration that is allowed.
+
+    Allowed durations need not be an interval (a slower turn swings out farther), so
+    a grid is tried, then the gap between the last one that fails and the first one
+    that does not.
+
+    Args:
+        allowed: Tells of durations (k,), s, which are allowed, (k,) bool.
+        durations: (n,) s, ascending grid.
+    """
+    good = allowed(durations)
+    if not good.any():
+        return None
+    first = int(np.argmax(good))
+    if first > 0:
+        between = np.linspace(durations[first - 1], durations[first], 8)[1:-1]
+        finer = allowed(between)
+        if finer.any():
+            return float(between[int(np.argmax(finer))])
+    return float(durations[first])
+
+
+def chain(
+    segments: Sequence[Segment],
+    *,
+    period: float,
+    spray_on: FloatArray | None = None,
+) -> Motion:
+    """Samples segments one after the other and joins the samples twice smoothly.
+
+    The velocities are those of the clamped cubic spline through the samples, so that
+    the motion's cubic Hermite curve *is* that spline: continuous to the second
+    derivative, at rest at both ends.
+
+    Args:
+        segments: At least one; the first starts and the last ends at rest.
+        period: Largest spacing of the samples, s.
+        spray_on: (m, 2) s, see `Motion.spray_on`; None = the gun stays closed.
+
+    Returns:
+        The motion, evenly sampled.
+    """
+    starts = start_times(segments)
+    total = float(starts[-1])
+    count = max(3, int(np.ceil(total / period - 1e-9)) + 1)
+    time = np.linspace(0.0, total, count)
+    owner = np.searchsorted(starts[1:-1], time, side="right")
+    q = np.empty((count, 5))
+    for index, segment in enumerate(segments):
+        mine = owner == index
+        if mine.any():
+            q[mine] = segment.q(time[mine] - starts[index])
+    v = CubicSpline(time, q, bc_type="clamped")(time, 1)
+    v[[0, -1]] = 0.0
+    spray = np.zeros((0, 2)) if spray_on is None else spray_on
+    return Motion(time=time, q=q, v=v, spray_on=spray)
+
+
+def start_times(segments: Sequence[Segment]) -> FloatArray:
+    """Returns when each segment of a chain starts, and at last when it ends, s."""
+    durations = np.array([segment.duration for segment in segments])
+    return np.concatenate([[0.0], np.cumsum(durations)])

@@ -1,0 +1,236 @@
+"""Gun-off moves between strokes, from rest and to rest, each checked for clearance."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from painter.errors import CollisionError, PainterError, ReachError
+from painter.planning.blend import MovingState
+from painter.planning.gun_path import SquareGun, ToolMove, fastest_tool_blend
+from painter.planning.joint_motion import Segment, fastest_joint_blend, rest_to_rest
+from painter.planning.kinematics import ArmLimits
+from painter.planning.obstacles import ClearSpace
+from perception.values import FloatArray, FrozenValue
+
+_STEP = 0.02  # s, spacing of the samples that are checked for clearance.
+_RISES = (0.5, 0.35, 0.25, 0.15)  # See `ToolBlend.rise`.
+_HOP_STEP = 0.05  # m; hops are rounded up to a multiple of it.
+# Standstills from which a pass is approached and to which it is left: (distance back
+# along the pass, distance away from the wall), m. Those first cost the least time.
+_ANCHORS = (
+    (0.10, 0.03),
+    (0.07, 0.0),
+    (0.03, 0.06),
+    (0.0, 0.10),
+    (-0.10, 0.10),
+    (-0.10, 0.20),
+    (-0.30, 0.15),
+    (-0.30, 0.30),
+)
+_WITHDRAWALS = (0.1, 0.2, 0.3)  # m, back from the wall, tried in turn.
+
+
+@dataclass(frozen=True, eq=False)
+class Linker(FrozenValue):
+    """Finds moves that keep joint limits and clearance.
+
+    Attributes:
+        gun: Inverse kinematics before the wall.
+        limits: Of the joints, as far as the plan may use them.
+        space: What must be kept clear of.
+        q_home: (5,) rad, folded pose over which detours go.
+    """
+
+    gun: SquareGun
+    limits: ArmLimits
+    space: ClearSpace
+    q_home: FloatArray
+
+    def between(self, start: MovingState, end: MovingState) -> list[Segment]:
+        """Joins two moving states: by a blend, a hop, or a detour through rest.
+
+        Args:
+            start: Where the gun comes from.
+            end: Where it goes on.
+
+        Returns:
+            The moves, first to last.
+
+        Raises:
+            CollisionError: Every way comes too near to something.
+            ReachError: Every way leaves the arm's reach or joint limits.
+        """
+        for hop in self._hops(min(start.x[2], end.x[2])):
+            ways = self._ways(start, end, hop)
+            for way in sorted(ways, key=lambda segment: segment.duration):
+                if self.clear(way):
+                    return [way]
+        leave = self.to_rest(start)
+        return [leave, *self.from_rest(end_q(leave), end)]
+
+    def from_rest(self, q: FloatArray, end: MovingState) -> list[Segment]:
+        """Goes from rest at `q` (5,), rad, to `end`; raises as `between` does."""
+        failure: PainterError | None = None
+        for anchor in _anchors(end, -1.0):
+            try:
+                arrive = self._blend(anchor, end)
+                return [*self.transit(q, start_q(arrive)), arrive]
+            except (CollisionError, ReachError) as error:
+                failure = failure or error
+        assert failure is not None
+        raise failure
+
+    def to_rest(self, start: MovingState) -> Segment:
+        """Goes from `start` to rest nearby; raises as `between` does."""
+        failure: PainterError | None = None
+        for anchor in _anchors(start, 1.0):
+            try:
+                return self._blend(start, anchor)
+            except (CollisionError, ReachError) as error:
+                failure = failure or error
+        assert failure is not None
+        raise failure
+
+    def transit(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
+        """Goes from rest to rest: directly, or over the folded pose.
+
+        The folded pose is tried with the yaw of the start, with that of the end, and
+        with both (fold, turn, unfold).
+
+        Args:
+            q0: (5,) rad.
+            q1: (5,) rad.
+
+        Returns:
+            The moves, first to last.
+
+        Raises:
+            CollisionError: Every route comes too near to something; tells where the
+                direct one does.
+        """
+        folds = [self._folded(float(q[0])) for q in (q0, q1)]
+        routes: tuple[list[FloatArray], ...] = ([], folds[:1], folds[1:], folds)
+        for via in routes:
+            stops = itertools.pairwise((q0, *via, q1))
+            legs = [rest_to_rest(a, b, self.limits) for a, b in stops]
+            if all(self.clear(leg) for leg in legs):
+                return list(legs)
+        direct = rest_to_rest(q0, q1, self.limits)
+        self.require_clear(direct, what="transit")
+        raise AssertionError("the direct route was not clear a moment ago")
+
+    def withdraw(self, q0: FloatArray) -> list[Segment]:
+        """Goes home from rest at `q0`, straight back from the wall first if need be.
+
+        Args:
+            q0: (5,) rad.
+
+        Returns:
+            The moves, first to last.
+
+        Raises:
+            CollisionError: Every route comes too near to something; tells where the
+                direct one does.
+        """
+        try:
+            return self.transit(q0, self.q_home)
+        except CollisionError as error:
+            failure = error
+        _, p_WGs = self.gun.kinematics.gun_poses(q0[None])
+        p_TG = self.gun.X_WT.inverse() @ p_WGs[0]
+        for distance in _WITHDRAWALS:
+            q = self.gun.solve(p_TG + np.array([0.0, 0.0, distance]))
+            if not self.limits.contains(q[None])[0]:
+                continue
+            back = rest_to_rest(q0, q, self.limits)
+            if self.clear(back):
+                try:
+                    return [back, *self.transit(q, self.q_home)]
+                except CollisionError:
+                    continue
+        raise failure
+
+    def clear(self, segment: Segment) -> bool:
+        """Returns whether a segment keeps its clearance all the way."""
+        return self.space.all_free(segment.q(sample_times(segment)))
+
+    def require_clear(self, segment: Segment, *, what: str) -> None:
+        """Raises CollisionError if a segment, called `what`, does not keep clear."""
+        time = sample_times(segment)
+        self.space.require(segment.q(time), time, what=what)
+
+    def _ways(self, start: MovingState, end: MovingState, hop: float) -> list[Segment]:
+        """Returns blends from start to end: of the nozzle, and without hop of joints.
+
+        A joint blend turns faster and does not run out of reach at a tile's corners; a
+        nozzle's blend keeps straight between strokes of one line.
+        """
+        ways: list[Segment] = []
+        for rise in _RISES if hop else _RISES[:1]:
+            blend = fastest_tool_blend(
+                start, end, gun=self.gun, limits=self.limits, hop=hop, rise=rise
+            )
+            if blend is not None:
+                ways.append(ToolMove(blend, self.gun))
+        if not hop:
+            states = self.gun.joint_state(start), self.gun.joint_state(end)
+            turn = fastest_joint_blend(*states, self.limits)
+            if turn is not None:
+                ways.append(turn)
+        return ways
+
+    def _blend(self, start: MovingState, end: MovingState) -> Segment:
+        what = f"move from {_place(start)} to {_place(end)}"
+        blend = fastest_joint_blend(
+            self.gun.joint_state(start), self.gun.joint_state(end), self.limits
+        )
+        if blend is None:
+            raise ReachError(f"{what} leaves the arm's reach or its joint limits.")
+        self.require_clear(blend, what=what)
+        return blend
+
+    def _hops(self, standoff: float) -> list[float]:
+        """Returns how far to draw back, m: not at all, then over higher and higher."""
+        tops = np.array([box.upper[2] for box in self.space.boxes])
+        needed = tops + self.space.clearance - standoff
+        steps = np.unique(np.ceil(needed[needed > 0.0] / _HOP_STEP))
+        return [0.0, *(steps * _HOP_STEP).tolist()]
+
+    def _folded(self, yaw: float) -> FloatArray:
+        """Returns the home pose turned to a yaw, the gun keeping its direction."""
+        q = np.array(self.q_home, dtype=float)
+        q[4] += q[0] - yaw
+        q[0] = yaw
+        return q
+
+
+def sample_times(segment: Segment) -> FloatArray:
+    """Returns the times at which a segment is checked for clearance, s."""
+    count = max(2, int(np.ceil(segment.duration / _STEP)) + 1)
+    return np.linspace(0.0, segment.duration, count)
+
+
+def start_q(segment: Segment) -> FloatArray:
+    """Returns the joint angles (5,) at a segment's start, rad."""
+    return np.array(segment.q(np.zeros(1))[0])
+
+
+def end_q(segment: Segment) -> FloatArray:
+    """Returns the joint angles (5,) at a segment's end, rad."""
+    return np.array(segment.q(np.array([segment.duration]))[0])
+
+
+def _anchors(state: MovingState, sign: float) -> list[MovingState]:
+    """Returns standstills behind (-1) or beyond (+1) a moving nozzle in T."""
+    along = sign * state.v / np.linalg.norm(state.v)
+    away = np.array([0.0, 0.0, 1.0])
+    return [
+        MovingState.at_rest(state.x + back * along + out * away)
+        for back, out in _ANCHORS
+    ]
+
+
+def _place(state: MovingState) -> str:
+    x, y, z = state.x
+    return f"T ({x:.2f}, {y:.2f}, {z:.2f}) m"

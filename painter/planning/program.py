@@ -1,0 +1,211 @@
+"""From a segmentation to a paint program: strokes, their order in time, every move."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.planning import CollisionChecker
+
+from painter.errors import CollisionError, ReachError
+from painter.planning.config import MotionConfig, RasterConfig, TipConfig
+from painter.planning.deposition import mean_film
+from painter.planning.gun_path import Pass, SquareGun, ToolMove
+from painter.planning.joint_motion import Segment, chain, planning_limits, start_times
+from painter.planning.kinematics import ArmKinematics, ArmLimits
+from painter.planning.linker import Linker, end_q
+from painter.planning.obstacles import ClearSpace, segmentation_boxes
+from painter.planning.raster import plan_strokes
+from painter.planning.reach import require_reach
+from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
+from painter.planning.stroke_lines import nominal_pitch
+from painter.planning.verify import verify_motion, verify_strokes
+from perception.values import FloatArray, WallSegmentation
+
+_STEP = 0.02  # m along a stroke, between the places that are looked at.
+# m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
+# the room in which the arm stops and turns at 0.6 m/s.
+_STOPPING = 0.12
+
+
+def plan_program(
+    segmentation: WallSegmentation,
+    q0: FloatArray,
+    *,
+    kinematics: ArmKinematics,
+    limits: ArmLimits,
+    checker: CollisionChecker,
+    tip: TipConfig,
+    raster: RasterConfig,
+    motion: MotionConfig,
+) -> PaintProgram:
+    """Plans strokes over the wall alone and the motion that makes them.
+
+    Strokes that come nearer than the clearance to an obstacle are cut back; what is
+    cut, and strokes that cannot be come to, stand in the program's `skipped`.
+
+    Args:
+        segmentation: Of the tile.
+        q0: (5,) rad, where the arm stands, at rest.
+        kinematics: Of the arm.
+        limits: Of its joints.
+        checker: Of the robot's cell: arm, frame and floor.
+        tip: The spray tip.
+        raster: Settings of the strokes.
+        motion: Settings of the motion.
+
+    Returns:
+        The program, verified; its motion ends at the home pose.
+
+    Raises:
+        ReachError: A stroke is out of the arm's reach.
+        CollisionError: There is no clear way to any stroke, or home.
+        MotionLimitError: The finished motion fails its verification.
+    """
+    gun = SquareGun(kinematics, segmentation.X_WT)
+    space = ClearSpace(
+        checker,
+        X_WT=segmentation.X_WT,
+        boxes=segmentation_boxes(segmentation),
+        clearance=motion.clearance,
+        floor_clearance=motion.floor_clearance,
+    )
+    linker = Linker(
+        gun=gun,
+        limits=planning_limits(limits, motion.limit_share),
+        space=space,
+        q_home=np.deg2rad(motion.home_deg),
+    )
+    wanted = plan_strokes(
+        np.asarray(segmentation.wall_mask), segmentation.cell, tip=tip, raster=raster
+    )
+    clear, skipped = _clear_strokes(wanted, linker, raster)
+    path, strokes, passes, unlinked = _link(clear, q0, linker, raster.standoff)
+    starts = start_times(path)[:-1]
+    flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
+    spray_on = np.reshape(flows, (-1, 2)) - tip.valve_delay
+    program = PaintProgram(
+        strokes=strokes,
+        motion=chain(path, period=motion.sample_period, spray_on=spray_on),
+        X_WT=segmentation.X_WT,
+        standoff=raster.standoff,
+        nominal_thickness=nominal_film(segmentation, tip=tip, raster=raster),
+        paint_volume=tip.flow * sum(stroke.length / stroke.speed for stroke in strokes),
+        skipped=(*skipped, *unlinked),
+    )
+    verify_motion(
+        program.motion,
+        limits=limits,
+        limit_share=motion.limit_share,
+        space=space,
+        what="program",
+    )
+    verify_strokes(program, kinematics=kinematics, valve_delay=tip.valve_delay)
+    return program
+
+
+def nominal_film(
+    segmentation: WallSegmentation, *, tip: TipConfig, raster: RasterConfig
+) -> float:
+    """Returns the wet film that the raster of a tile aims at, m."""
+    width = segmentation.wall_mask.shape[1] * segmentation.cell
+    pitch = nominal_pitch(width, tip=tip, raster=raster)
+    return float(mean_film(tip, speed=raster.speed, pitch=pitch))
+
+
+def _clear_strokes(
+    strokes: Sequence[Stroke], linker: Linker, raster: RasterConfig
+) -> tuple[list[Stroke], list[SkippedStroke]]:
+    """Cuts strokes back to what keeps clear; returns what stays and what does not."""
+    clear: list[Stroke] = []
+    skipped: list[SkippedStroke] = []
+    for number, stroke in enumerate(strokes):
+        count = max(2, int(np.ceil(stroke.length / _STEP)) + 1)
+        share = np.linspace(0.0, 1.0, count)
+        p_TGs = _nozzle(
+            stroke.start_T + np.outer(share, stroke.end_T - stroke.start_T),
+            raster.standoff,
+        )
+        what = f"stroke {number + 1} on line {stroke.column + 1}"
+        q = require_reach(p_TGs, gun=linker.gun, limits=linker.limits, what=what)
+        free = linker.space.free(q)
+        if free.all():
+            clear.append(stroke)
+            continue
+        for first, last, is_free in _runs(free):
+            room = _STOPPING / stroke.length
+            cut_start, cut_end = first > 0, last < count - 1
+            if is_free:
+                begin = share[first] + room * cut_start
+                end = max(share[last] - room * cut_end, begin)
+            else:
+                begin = max(share[first] - room - share[1], 0.0) if cut_start else 0.0
+                end = min(share[last] + room + share[1], 1.0) if cut_end else 1.0
+            part = _part(stroke, begin, end)
+            if is_free and part.length >= raster.min_stroke:
+                clear.append(part)
+            elif is_free:
+                skipped.append(SkippedStroke(part, "shorter than raster.min_stroke"))
+            else:
+                middle = (first + last) // 2
+                skipped.append(SkippedStroke(part, linker.space.worst_pair(q[middle])))
+    return clear, skipped
+
+
+def _link(
+    strokes: Sequence[Stroke], q0: FloatArray, linker: Linker, standoff: float
+) -> tuple[list[Segment], tuple[Stroke, ...], list[int], list[SkippedStroke]]:
+    """Joins strokes by moves, from rest at `q0` to rest at home.
+
+    Returns:
+        The segments; the strokes that could be come to; the index of each one's
+        segment; and the strokes that could not, with the reason.
+    """
+    path: list[Segment] = []
+    done: list[Stroke] = []
+    passes: list[int] = []
+    skipped: list[SkippedStroke] = []
+    last: Pass | None = None
+    for stroke in strokes:
+        ends = _nozzle(np.stack([stroke.start_T, stroke.end_T]), standoff)
+        this = Pass.between(ends[0], ends[1], stroke.speed)
+        try:
+            if last is None:
+                link = linker.from_rest(q0, this.start)
+            else:
+                link = linker.between(last.end, this.start)
+            linker.to_rest(this.end)  # Never go where there is no way back.
+        except (CollisionError, ReachError) as error:
+            skipped.append(SkippedStroke(stroke, str(error)))
+            continue
+        path += [*link, ToolMove(this, linker.gun)]
+        passes.append(len(path) - 1)
+        done.append(stroke)
+        last = this
+    if strokes and not done:
+        raise CollisionError(f"no stroke can be come to: {skipped[0].reason}")
+    q_end = q0
+    if last is not None:
+        path.append(linker.to_rest(last.end))
+        q_end = end_q(path[-1])
+    path += linker.transit(q_end, linker.q_home)
+    return path, tuple(done), passes, skipped
+
+
+def _nozzle(p_T: FloatArray, standoff: float) -> FloatArray:
+    """Returns nozzle positions (n, 3), m, over wall points (n, 2), in T."""
+    return np.column_stack([p_T, np.full(len(p_T), standoff)])
+
+
+def _part(stroke: Stroke, begin: float, end: float) -> Stroke:
+    """Returns a stroke's part between two shares of its length."""
+    travel = stroke.end_T - stroke.start_T
+    return stroke.replace(
+        start_T=stroke.start_T + begin * travel, end_T=stroke.start_T + end * travel
+    )
+
+
+def _runs(free: np.ndarray) -> list[tuple[int, int, bool]]:
+    """Returns (first, last, value) of each run of equal values."""
+    edges = np.flatnonzero(np.diff(free.astype(int))) + 1
+    firsts = [0, *edges.tolist()]
+    lasts = [*(edges - 1).tolist(), len(free) - 1]
+    return [(a, b, bool(free[a])) for a, b in zip(firsts, lasts, strict=True)]

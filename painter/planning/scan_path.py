@@ -1,0 +1,210 @@
+"""First sight of the wall and the zig-zag scan, as motions of the depth camera.
+
+The camera looks square at the wall, like the gun beside it. Its field of view is that
+of the D435's depth: 87 x 58 deg. Source: Intel RealSense D400 series data sheet,
+2023, table 4-2 (848 x 480).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from painter.errors import ReachError
+from painter.planning.config import ScanConfig, TileConfig
+from painter.planning.gun_path import Pass, SquareGun, ToolMove
+from painter.planning.joint_motion import Segment
+from painter.planning.linker import Linker
+from painter.planning.reach import require_reach
+from perception.values import FloatArray, FrozenValue
+
+_HFOV = np.deg2rad(87.0)
+_VFOV = np.deg2rad(58.0)
+_BASELINE = 0.050  # m; the left edge of a stereo depth image is blind for so much.
+_ROW_STEP = 0.01  # m, between the row heights that are tried.
+_POINT_STEP = 0.02  # m, between the places on a row that are looked at.
+_SHORTEST_ROW = 0.05  # m; a row is a pass and a pass has a direction.
+
+
+@dataclass(frozen=True, eq=False)
+class View(FrozenValue):
+    """What a square depth camera sees of a plane.
+
+    Attributes:
+        left: How far to the left of its axis, m.
+        right: How far to the right, m.
+        half_height: How far above and below, m.
+    """
+
+    left: float
+    right: float
+    half_height: float
+
+
+def view_at(distance: float) -> View:
+    """Returns what the depth camera sees of a wall at a distance, m.
+
+    The right imager is one baseline to the right of the left one, where depth is
+    reported: a strip as wide as the baseline on the left side has no match in it.
+    """
+    half_width = float(distance * np.tan(_HFOV / 2.0))
+    half_height = float(distance * np.tan(_VFOV / 2.0))
+    return View(half_width - _BASELINE, half_width, half_height)
+
+
+def nozzle_under_camera(p_TCs: FloatArray, gun: SquareGun) -> FloatArray:
+    """Returns where the nozzle is with the square camera at p_TCs (n, 3), m, in T.
+
+    With the tool square to the wall L's axes in T are x = -z, y = -x, z = y.
+    """
+    arm = gun.kinematics
+    ahead, left, above = arm.X_LG.translation() - arm.X_LC.translation()
+    return np.asarray(p_TCs + np.array([-left, above, -ahead]))
+
+
+def look_pose(tile: TileConfig, scan: ScanConfig, linker: Linker) -> FloatArray:
+    """Finds the pose for first sight: near the tile's centre, where the arm can stand.
+
+    Straight before the shoulder the arm would have to fold flat, so the nearest place
+    beside, above or below the centre is taken.
+
+    Args:
+        tile: Size of the tile.
+        scan: Settings; `look_distance` is kept.
+        linker: Reach and clearance.
+
+    Returns:
+        (5,) rad.
+
+    Raises:
+        ReachError: The camera can stand at that distance nowhere before the tile.
+    """
+    x, y = np.meshgrid(
+        np.arange(-0.5, 0.55, 0.1) * tile.width,
+        np.arange(-0.5, 0.525, 0.05) * tile.height,
+    )
+    offsets = np.stack([x.ravel(), y.ravel()], axis=-1)
+    nearest_first = np.argsort(np.linalg.norm(offsets, axis=1), kind="stable")
+    p_TCs = np.column_stack(
+        [
+            offsets[nearest_first] + [tile.width / 2.0, tile.height / 2.0],
+            np.full(len(offsets), scan.look_distance),
+        ]
+    )
+    good = _standable(nozzle_under_camera(p_TCs, linker.gun), linker)
+    if not good.any():
+        raise ReachError(
+            f"look: no clear pose with the camera {scan.look_distance:.2f} m before "
+            f"the tile."
+        )
+    p_TG = nozzle_under_camera(p_TCs[[int(np.argmax(good))]], linker.gun)
+    return np.array(linker.gun.solve(p_TG)[0])
+
+
+def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
+    """Lays level camera rows over the tile, top row first, ending at its left.
+
+    As few rows as cover the tile and its margin with at least the overlap wanted,
+    at heights where the arm reaches the whole row.
+
+    Args:
+        tile: Size of the tile.
+        scan: Settings; distance, speed, overlap and margin are kept.
+        linker: Reach and clearance.
+
+    Returns:
+        Rows as passes of the nozzle.
+
+    Raises:
+        ReachError: The camera cannot cover the tile; names height and distance.
+    """
+    view = view_at(scan.distance)
+    left = -scan.margin + view.left
+    right = tile.width + scan.margin - view.right
+    if right - left < _SHORTEST_ROW:
+        middle = (left + right) / 2.0
+        left, right = middle - _SHORTEST_ROW / 2.0, middle + _SHORTEST_ROW / 2.0
+    heights = _row_heights(tile, scan, linker, left, right)[::-1]
+    rows: list[Pass] = []
+    rightwards = len(heights) % 2 == 0
+    for height in heights:
+        x0, x1 = (left, right) if rightwards else (right, left)
+        p_TCs = np.array([[x0, height, scan.distance], [x1, height, scan.distance]])
+        p_TGs = nozzle_under_camera(p_TCs, linker.gun)
+        rows.append(Pass.between(p_TGs[0], p_TGs[1], scan.speed))
+        rightwards = not rightwards
+    return rows
+
+
+def scan_segments(
+    q0: FloatArray, tile: TileConfig, scan: ScanConfig, linker: Linker
+) -> list[Segment]:
+    """Plans the whole scan from rest at `q0` (5,) rad, to rest beside the last row.
+
+    Raises:
+        ReachError: A row or the way to it is out of reach.
+        CollisionError: There is no clear way.
+    """
+    rows = scan_rows(tile, scan, linker)
+    path = linker.from_rest(q0, rows[0].start)
+    for index, row in enumerate(rows):
+        if index > 0:
+            path += linker.between(rows[index - 1].end, row.start)
+        path.append(ToolMove(row, linker.gun))
+    path.append(linker.to_rest(rows[-1].end))
+    return path
+
+
+def _row_heights(
+    tile: TileConfig, scan: ScanConfig, linker: Linker, left: float, right: float
+) -> list[float]:
+    """Returns row heights in T, bottom to top, m."""
+    view = view_at(scan.distance)
+    bottom = -scan.margin + view.half_height  # The first row may be no higher,
+    top = tile.height + scan.margin - view.half_height  # nor the last one lower.
+    spacing = 2.0 * view.half_height * (1.0 - scan.overlap)
+    if top <= bottom:
+        bottom = top = (top + bottom) / 2.0
+    # Spread evenly where the arm can; else the highest that still overlaps.
+    count = 1 + int(np.ceil((top - bottom) / spacing - 1e-9))
+    even: list[float] = np.linspace(bottom, top, count).tolist()
+    x = np.linspace(left, right, int((right - left) / _POINT_STEP) + 2)
+
+    def clear(height: float) -> bool:
+        return bool(_standable(_row_points(x, height, scan, linker), linker).all())
+
+    if all(clear(height) for height in even):
+        return even
+    heights: list[float] = []
+    limit = bottom
+    while not heights or heights[-1] < top:
+        floor = heights[-1] if heights else limit - view.half_height
+        limit = heights[-1] + spacing if heights else bottom
+        tries = np.arange(limit, floor + _ROW_STEP / 2.0, -_ROW_STEP)
+        found = next((float(height) for height in tries if clear(height)), None)
+        if found is None:
+            points = _row_points(x, limit, scan, linker)
+            what = f"scan row {tile.bottom + limit:.2f} m over the floor"
+            require_reach(points, gun=linker.gun, limits=linker.limits, what=what)
+            q = linker.gun.solve(points)
+            linker.space.require(q, np.zeros(len(q)), what=what)
+        else:
+            heights.append(found)
+    return heights
+
+
+def _row_points(
+    x: FloatArray, height: float, scan: ScanConfig, linker: Linker
+) -> FloatArray:
+    """Returns nozzle positions (n, 3) along a camera row, m, in T."""
+    p_TCs = np.column_stack(
+        [x, np.full(x.size, height), np.full(x.size, scan.distance)]
+    )
+    return nozzle_under_camera(p_TCs, linker.gun)
+
+
+def _standable(p_TGs: FloatArray, linker: Linker) -> np.ndarray:
+    """Returns (n,) bool: where the arm reaches and keeps clear."""
+    q = linker.gun.solve(p_TGs)
+    good = linker.limits.contains(q)
+    good[good] = linker.space.free(q[good])
+    return np.asarray(good)

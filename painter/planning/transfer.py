@@ -1,0 +1,119 @@
+"""Gun-off motions of the cycle: home, first sight, scan, retract."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.planning import CollisionChecker
+
+from painter.errors import CollisionError
+from painter.planning.config import MotionConfig, ScanConfig, TileConfig
+from painter.planning.gun_path import SquareGun
+from painter.planning.joint_motion import Segment, chain, planning_limits
+from painter.planning.kinematics import ArmKinematics, ArmLimits
+from painter.planning.linker import Linker
+from painter.planning.obstacles import ClearSpace, wall_box
+from painter.planning.reach import require_reach, tile_points
+from painter.planning.scan_path import look_pose, scan_segments
+from painter.planning.spray_path import Motion
+from painter.planning.verify import verify_motion
+from perception.values import FloatArray
+
+GOALS = ("home", "look", "scan", "retract")
+
+
+def plan_transfer(
+    goal: str,
+    q0: FloatArray,
+    *,
+    X_WT: RigidTransform,
+    standoff: float,
+    kinematics: ArmKinematics,
+    limits: ArmLimits,
+    checker: CollisionChecker,
+    tile: TileConfig,
+    scan: ScanConfig,
+    motion: MotionConfig,
+) -> Motion:
+    """Plans a motion with the gun closed.
+
+    Until the wall has been scanned the arm keeps `motion.wall_keepout` and the
+    clearance from it. "look" and "scan" first make sure that the whole tile can be
+    painted from where the arm stands, so that a job that cannot be done ends at once.
+
+    Args:
+        goal: "home" or "retract": to the home pose; "look": to where the camera sees
+            the tile; "scan": along rows over the tile.
+        q0: (5,) rad, where the arm stands, at rest.
+        X_WT: Tile frame T in W, as expected or as found.
+        standoff: Of the gun when it paints, m.
+        kinematics: Of the arm.
+        limits: Of its joints.
+        checker: Of the robot's cell: arm, frame and floor.
+        tile: Size of the tile.
+        scan: Settings of first sight and scan.
+        motion: Settings of the motion.
+
+    Returns:
+        The motion, verified.
+
+    Raises:
+        ValueError: There is no such goal.
+        ReachError: The tile, or the wall, is out of the arm's reach.
+        CollisionError: There is no clear way.
+        MotionLimitError: The finished motion fails its verification.
+    """
+    if goal not in GOALS:
+        raise ValueError(f"goal must be one of {', '.join(GOALS)}, got {goal!r}.")
+    gun = SquareGun(kinematics, X_WT)
+    if goal in ("look", "scan"):
+        points = tile_points(tile.width, tile.height, standoff)
+        what = f"tile of {tile.width:.2f} x {tile.height:.2f} m"
+        require_reach(points, gun=gun, limits=limits, what=what)
+    # After painting, or once stopped half way, the gun may stand within the keepout.
+    keepouts = (0.0,) if goal == "retract" else (motion.wall_keepout, 0.0)
+    space = _space_around(q0, keepouts, X_WT, checker, tile, motion)
+    linker = Linker(
+        gun=gun,
+        limits=planning_limits(limits, motion.limit_share),
+        space=space,
+        q_home=np.deg2rad(motion.home_deg),
+    )
+    path: Sequence[Segment]
+    if goal == "scan":
+        path = scan_segments(q0, tile, scan, linker)
+    elif goal == "look":
+        path = linker.transit(q0, look_pose(tile, scan, linker))
+    else:
+        path = linker.withdraw(q0)
+    planned = chain(path, period=motion.sample_period)
+    verify_motion(
+        planned,
+        limits=limits,
+        limit_share=motion.limit_share,
+        space=space,
+        what=f"motion {goal!r}",
+    )
+    return planned
+
+
+def _space_around(
+    q0: FloatArray,
+    keepouts: Sequence[float],
+    X_WT: RigidTransform,
+    checker: CollisionChecker,
+    tile: TileConfig,
+    motion: MotionConfig,
+) -> ClearSpace:
+    """Returns the space with the largest keepout that the arm does not stand in."""
+    for keepout in keepouts:
+        space = ClearSpace(
+            checker,
+            X_WT=X_WT,
+            boxes=[wall_box(tile.width, tile.height, keepout=keepout)],
+            clearance=motion.clearance,
+            floor_clearance=motion.floor_clearance,
+        )
+        if space.all_free(q0[None]):
+            return space
+    raise CollisionError(f"the arm stands where it may not: {space.worst_pair(q0)}.")

@@ -1,0 +1,150 @@
+"""A dense second look at a finished motion: what is executed, not how it was made."""
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from painter.errors import MotionLimitError
+from painter.planning.kinematics import ArmKinematics, ArmLimits
+from painter.planning.obstacles import ClearSpace
+from painter.planning.spray_path import Motion, PaintProgram
+from perception.values import FloatArray
+
+_STEP = 0.002  # s, of the resampled motion.
+_SPEED_TOLERANCE = 0.02  # Share of the stroke's speed.
+_STANDOFF_TOLERANCE = 0.002  # m
+_PLACE_TOLERANCE = 0.002  # m, nozzle from the stroke's line and ends.
+_ANGLE_TOLERANCE_DEG = 0.5  # Spray axis from the wall's normal.
+_POSITION_TOLERANCE = 1e-3  # rad; a measured start may lie a hair outside.
+_RATE_TOLERANCE = 1.02  # Share of the planned limits.
+_JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
+
+
+def verify_motion(
+    motion: Motion,
+    *,
+    limits: ArmLimits,
+    limit_share: float,
+    space: ClearSpace,
+    what: str,
+) -> None:
+    """Checks joint limits and clearance all along a motion.
+
+    Args:
+        motion: As it will be executed.
+        limits: Of the joints.
+        limit_share: Share of their velocities and accelerations that plans may use.
+        space: What must be kept clear of.
+        what: Name of the motion, for messages.
+
+    Raises:
+        MotionLimitError: A joint leaves its position, velocity or acceleration limit;
+            names joint, time, value and bound.
+        CollisionError: The arm comes nearer than its clearance; names bodies and time.
+    """
+    time = _dense(0.0, motion.duration)
+    share = limit_share * _RATE_TOLERANCE
+    position = motion.trajectory
+    velocity = position.MakeDerivative()
+    acceleration = velocity.MakeDerivative()
+    q = position.vector_values(time).T
+    middle = (limits.q_min + limits.q_max) / 2.0
+    half_range = (limits.q_max - limits.q_min) / 2.0 + _POSITION_TOLERANCE
+    for name, unit, values, bounds in (
+        ("position from mid-range", "rad", q - middle, half_range),
+        ("velocity", "rad/s", velocity.vector_values(time).T, share * limits.v_max),
+        (
+            "acceleration",
+            "rad/s²",
+            acceleration.vector_values(time).T,
+            share * limits.a_max,
+        ),
+    ):
+        _require_within(f"{what}: {name}", unit, time, values, bounds)
+    space.require(motion.q, motion.time, what=what)
+
+
+def verify_strokes(
+    program: PaintProgram, *, kinematics: ArmKinematics, valve_delay: float
+) -> None:
+    """Checks gun speed, stand-off, angle and place while the paint flows.
+
+    Args:
+        program: As it will be executed; stroke i flows in `spray_on` row i.
+        kinematics: Of the arm.
+        valve_delay: From trigger to flow, opening and closing, s.
+
+    Raises:
+        MotionLimitError: Names stroke, time, quantity, value and bound.
+    """
+    motion = program.motion
+    if len(motion.spray_on) != len(program.strokes):
+        raise MotionLimitError(
+            f"program: the gun opens {len(motion.spray_on)} times for "
+            f"{len(program.strokes)} strokes."
+        )
+    for number, stroke in enumerate(program.strokes):
+        opens, closes = motion.spray_on[number] + valve_delay
+        time = _dense(opens, closes)
+        q = motion.trajectory.vector_values(time).T
+        p_TGs, axis_T = _gun_in_tile(q, program.X_WT, kinematics)
+        along = (stroke.end_T - stroke.start_T) / stroke.length
+        ideal = stroke.start_T + np.outer((time - opens) * stroke.speed, along)
+        off_axis_deg = np.rad2deg(np.arccos(np.clip(-axis_T[:, 2], -1.0, 1.0)))
+        speed = np.linalg.norm(np.gradient(p_TGs[:, :2], time, axis=0), axis=1)
+        end = stroke.start_T + along * stroke.speed * (closes - opens)
+        what = f"stroke {number + 1}"
+        for name, unit, values, bound in (
+            (
+                "speed error",
+                "m/s",
+                speed - stroke.speed,
+                _SPEED_TOLERANCE * stroke.speed,
+            ),
+            (
+                "stand-off error",
+                "m",
+                p_TGs[:, 2] - program.standoff,
+                _STANDOFF_TOLERANCE,
+            ),
+            ("gun angle", "deg", off_axis_deg, _ANGLE_TOLERANCE_DEG),
+            ("place across x", "m", p_TGs[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
+            ("place along y", "m", p_TGs[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
+            ("end", "m", end - stroke.end_T, _PLACE_TOLERANCE),
+        ):
+            _require_within(f"{what}: {name}", unit, time, values, bound)
+
+
+def _gun_in_tile(
+    q: FloatArray, X_WT: RigidTransform, kinematics: ArmKinematics
+) -> tuple[FloatArray, FloatArray]:
+    """Returns the nozzle (n, 3), m, and the spray axis (n, 3), both in T."""
+    R_WGs, p_WGs = kinematics.gun_poses(q)
+    X_TW = X_WT.inverse()
+    p_TGs = (X_TW @ p_WGs.T).T
+    axes_T = (X_TW.rotation().matrix() @ R_WGs[:, :, 2].T).T
+    return p_TGs, axes_T
+
+
+def _dense(start: float, end: float) -> FloatArray:
+    return np.linspace(start, end, max(3, int(np.ceil((end - start) / _STEP)) + 1))
+
+
+def _require_within(
+    what: str,
+    unit: str,
+    time: FloatArray,
+    values: FloatArray,
+    bounds: FloatArray | float,
+) -> None:
+    """Raises for the value that exceeds its bound most; values (n,) or (n, 5)."""
+    size = np.abs(values)
+    bounds = np.broadcast_to(bounds, size.shape)
+    excess = np.where(np.isfinite(size), size / bounds, np.inf)
+    worst = np.unravel_index(int(np.argmax(excess)), size.shape)
+    if excess[worst] <= 1.0:
+        return
+    joint = f" of {_JOINTS[worst[1]]}" if size.shape[1:] == (5,) else ""
+    raise MotionLimitError(
+        f"{what}{joint} is {size[worst]:.4g} {unit} at {time[worst[0]]:.3f} s, "
+        f"allowed is {bounds[worst]:.4g} {unit}."
+    )

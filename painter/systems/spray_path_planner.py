@@ -1,0 +1,104 @@
+"""The stage that plans the paint program."""
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.planning import CollisionChecker
+from pydrake.systems.framework import Context
+
+from painter.errors import PainterError
+from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
+from painter.planning.kinematics import ArmKinematics, ArmLimits
+from painter.planning.program import plan_program
+from painter.planning.spray_path import PaintProgram
+from painter.planning.tile import grid_shape
+from painter.systems.ports import EvalAs
+from painter.systems.stage import Stage
+from painter.systems.values import StageResult
+from perception.config import check_positive
+from perception.values import WallSegmentation
+
+
+class SprayPathPlanner(Stage):
+    """Plans strokes over the wall alone, and the motion that makes them.
+
+    .. pydrake_system::
+
+        name: SprayPathPlanner
+        input_ports:
+        - request
+        - state
+        - segmentation
+        output_ports:
+        - result
+
+    Ports:
+        request: StageRequest; acted on when it names "spray_path_planner" and is new.
+        state: (10,) q and v, rad and rad/s, where the arm stands, at rest.
+        segmentation: StageResult of the wall segmenter.
+        result: StageResult; its value is a PaintProgram that starts at `state` and ends
+            at the home pose.
+
+    State is the last StageResult.
+    """
+
+    def __init__(
+        self,
+        *,
+        kinematics: ArmKinematics,
+        limits: ArmLimits,
+        checker: CollisionChecker,
+        tile: TileConfig,
+        tip: TipConfig,
+        raster: RasterConfig,
+        motion: MotionConfig,
+        period: float,
+    ) -> None:
+        """Creates the stage.
+
+        Args:
+            kinematics: Of the arm.
+            limits: Of its joints.
+            checker: Of the robot's cell: arm, frame and floor.
+            tile: Size that the segmentation must have.
+            tip: The spray tip.
+            raster: Settings of the strokes.
+            motion: Settings of the motion.
+            period: Time between looks at the request, s.
+
+        Raises:
+            ValueError: A setting is out of bounds.
+        """
+        check_positive("spray_path_planner", period=period)
+        for config in (tile, tip, raster, motion):
+            config.validate()
+        super().__init__(stage="spray_path_planner", period=period)
+        self._tile = tile
+        self._settings = {
+            "kinematics": kinematics,
+            "limits": limits,
+            "checker": checker,
+            "tip": tip,
+            "raster": raster,
+            "motion": motion,
+        }
+        # Inputs.
+        self._state_port = self.DeclareVectorInputPort("state", 10)
+        self._segmentation_port = self.DeclareAbstractInputPort(
+            "segmentation", Value(StageResult())
+        )
+
+    def _Work(self, context: Context, goal: str) -> PaintProgram:
+        segmentation = EvalAs(self._segmentation_port, context, StageResult).value
+        if not isinstance(segmentation, WallSegmentation):
+            raise PainterError(
+                f"{self.GetSystemPathname()}:segmentation carries no segmentation: "
+                f"none was made yet."
+            )
+        shape = grid_shape(self._tile, segmentation.cell)
+        if segmentation.wall_mask.shape != shape:
+            raise PainterError(
+                f"{self.GetSystemPathname()}:segmentation has "
+                f"{segmentation.wall_mask.shape} cells, the tile {shape}."
+            )
+        q0 = np.array(self._state_port.Eval(context)[:5])
+        return plan_program(segmentation, q0, **self._settings)
