@@ -29,7 +29,7 @@ def segmentation_picture(path: Path, steps: SegmentationSteps, *, title: str) ->
     result = steps.segmentation
     ny, nx = result.labels.shape
     panel = 4.2
-    figure = style.new_figure(4 * panel + 1.2, panel * min(1.6, ny / nx) + 0.9)
+    figure = style.new_figure(4 * panel + 1.2, panel * min(1.6, ny / nx) + 1.6)
     axes = figure.subplots(1, 4, sharex=True, sharey=True)
     draw_points(axes[0], steps)
     draw_labels(axes[1], result)
