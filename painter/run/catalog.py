@@ -201,6 +201,12 @@ FIGURES = (
     FigureInfo("stroke_count", ARM, "Strokes of the program.", digits=0),
     FigureInfo("stroke_length_m", ARM, "Their length in all.", unit="m"),
     FigureInfo(
+        "skipped_length_m",
+        ARM,
+        "Length of strokes left out because the arm cannot do them.",
+        unit="m",
+    ),
+    FigureInfo(
         "collisions",
         ARM,
         "Contacts and clearance violations in the executed cycle.",

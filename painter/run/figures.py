@@ -83,6 +83,7 @@ def _program(program: PaintProgram) -> dict[str, Any]:
     return {
         "stroke_count": len(program.strokes),
         "stroke_length_m": sum(stroke.length for stroke in program.strokes),
+        "skipped_length_m": float(sum(item.stroke.length for item in program.skipped)),
         "program_time_s": program.motion.duration,
         "nominal_thickness_m": program.nominal_thickness,
     }

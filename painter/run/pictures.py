@@ -187,6 +187,9 @@ def stroke_picture(program: PaintProgram, segmentation: WallSegmentation) -> Fig
         axes.plot(
             *middle, marker=(3, 0, angle), ms=9, mec="white", mew=0.7, c=color, zorder=4
         )
+    for item in program.skipped:
+        line = np.stack([item.stroke.start_T, item.stroke.end_T])
+        axes.plot(*line.T, color=style.VERMILION, lw=2.2, ls=":", zorder=3)
     if strokes:
         _mark_ends(axes, strokes[0].start_T, strokes[-1].end_T)
     figure.legend(
@@ -220,6 +223,11 @@ def _stroke_entries(program: PaintProgram) -> Sequence[Line2D]:
         )
         for kind, lengths in kinds.items()
     ]
+    if program.skipped:
+        length = sum(item.stroke.length for item in program.skipped)
+        label = f"left out: {len(program.skipped)}, {length:.1f} m"
+        color = style.VERMILION
+        entries.append(Line2D([], [], color=color, lw=2.2, ls=":", label=label))
     dot: dict[str, Any] = {"ls": "", "markersize": 6}
     entries.append(Line2D([], [], marker="o", color=style.GREEN, label="first", **dot))
     entries.append(

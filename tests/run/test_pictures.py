@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from painter.planning.spray_path import SkippedStroke
 from painter.run import charts, pictures, style
 from painter.run.values import Film
 
@@ -52,6 +53,15 @@ def test_stroke_picture_draws_every_stroke_and_way(program, segmentation):
         assert (tuple(stroke.start_T), tuple(stroke.end_T)) in drawn
     for before, after in zip(program.strokes, program.strokes[1:], strict=False):
         assert (tuple(before.end_T), tuple(after.start_T)) in drawn
+
+
+def test_stroke_picture_names_what_was_left_out(program, segmentation):
+    *kept, last = program.strokes
+    skipped = SkippedStroke(last, "out of reach")
+    dut = program.replace(strokes=tuple(kept), skipped=(skipped,))
+    figure = pictures.stroke_picture(dut, segmentation)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "left out: 1, 2.0 m" in texts
 
 
 @pytest.mark.parametrize("value", [0.0, 2e-4])
