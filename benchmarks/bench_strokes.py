@@ -1,8 +1,8 @@
 """Coverage and overspray of planned strokes, by the closed form of the film.
 
-Run `python benchmarks/bench_strokes.py`. The masks are exact and the gun is where it should
-be: what a simulated cycle gives is this less the errors of map, base and arm. Film is
-counted as DESIGN.md section 6 says; spray beyond the tile's edge is overspray too.
+Run `python benchmarks/bench_strokes.py`. The masks are exact and the gun is where it
+should be: what a simulated cycle gives is this less the errors of map, base and arm.
+Spray beyond the tile's edge is overspray too.
 """
 
 import time
@@ -39,11 +39,11 @@ def main() -> None:
         "25 cm": TipConfig(),
         "12 cm": TipConfig(fan_width=0.12, flow=7.28e-6),
     }
-    print("fan    lead   mask       lines strokes  >=80 %  >=50 %    over    CV  plan")
+    print("fan    lead    mask       lines strokes  >=80 %  >=50 %    over    CV  plan")
     for fan, tip in tips.items():
-        for lead in (0.0, 0.01, 0.02):
+        for lead in (0.0, 0.005, 0.01, 0.02):
             for name, mask in masks().items():
-                print(f"{fan}  {lead:.2f} m {name:10}", row(mask, tip, lead))
+                print(f"{fan}  {lead:.3f} m {name:10}", row(mask, tip, lead))
 
 
 def masks() -> dict[str, BoolArray]:
