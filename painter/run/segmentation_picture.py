@@ -57,7 +57,7 @@ def draw_points(ax: Axes, steps: SegmentationSteps) -> None:
     shown = np.flatnonzero(inside & found.kept)
     # Far points first, so that near ones cover them.
     shown = shown[np.argsort(p_TQs[2, shown])]
-    dots = {"s": 1.2, "linewidths": 0, "rasterized": True}
+    dots: dict[str, Any] = {"s": 1.2, "linewidths": 0, "rasterized": True}
     x, y, z = p_TQs[:, shown]
     ax.scatter(x, y, c=z, cmap="RdYlBu", norm=_depth_norm(), **dots)
     x, y, _ = p_TQs[:, inside & ~found.kept]
