@@ -159,8 +159,8 @@ def drop_specks(mask: BoolArray, *, min_area: float, cell: float) -> BoolArray:
         (ny, nx) the mask without them.
     """
     parts, _ = label(mask, structure=np.ones((3, 3)))
-    large: BoolArray = ~_tiny(parts, min_area=min_area, cell=cell)
-    return mask & large[parts]
+    kept: BoolArray = mask & ~_tiny(parts, min_area=min_area, cell=cell)[parts]
+    return kept
 
 
 def sort_by_area(regions: IntArray) -> IntArray:
