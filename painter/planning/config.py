@@ -123,7 +123,8 @@ class ScanConfig:
     Attributes:
         look_distance: Camera to expected wall at first sight, m.
         look_time: How long the arm holds still for first sight, s.
-        distance: Camera to wall during the scan, m.
+        distance: Camera to wall during the scan, m; up to a fifth less where the arm
+            cannot fold back so far.
         speed: Camera speed on the rows, m/s.
         overlap: Share of a picture's height that neighbouring rows share.
         margin: How far beyond the tile's edge the pictures reach, m.

@@ -28,7 +28,7 @@ _ANCHORS = (
     (-0.30, 0.15),
     (-0.30, 0.30),
 )
-_WITHDRAWALS = (0.1, 0.2, 0.3)  # m, back from the wall, tried in turn.
+_DRAWN_BACK = (0.3, 0.2, 0.1)  # m from where the gun is, tried in turn.
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +93,11 @@ class Linker(FrozenValue):
         raise failure
 
     def transit(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
-        """Goes from rest to rest: directly, or over the folded pose.
+        """Goes from rest to rest: directly, or over poses where there is more room.
 
-        The folded pose is tried with the yaw of the start, with that of the end, and
-        with both (fold, turn, unfold).
+        These are the folded pose with the yaw of the start, with that of the end, and
+        with both (fold, turn, unfold); and, before and after, poses straight back from
+        the wall.
 
         Args:
             q0: (5,) rad.
@@ -110,46 +111,35 @@ class Linker(FrozenValue):
                 direct one does.
         """
         folds = [self._folded(float(q[0])) for q in (q0, q1)]
-        routes: tuple[list[FloatArray], ...] = ([], folds[:1], folds[1:], folds)
+        back, forth = self._drawn_back(q0), self._drawn_back(q1)
+        routes: tuple[list[FloatArray], ...] = (
+            [],
+            folds[:1],
+            folds[1:],
+            folds,
+            [*back, *forth],
+            [*back, *folds],
+            [*folds, *forth],
+            [*back, *folds, *forth],
+        )
+        known: dict[tuple[int, int], bool] = {}
         for via in routes:
-            stops = itertools.pairwise((q0, *via, q1))
-            legs = [rest_to_rest(a, b, self.limits) for a, b in stops]
-            if all(self.clear(leg) for leg in legs):
-                return list(legs)
+            stops = [q0, *via, q1]
+            legs: list[Segment] = []
+            for a, b in itertools.pairwise(stops):
+                leg = rest_to_rest(a, b, self.limits)
+                # Routes share legs; checking one for clearance is what takes time.
+                key = (id(a), id(b))
+                if key not in known:
+                    known[key] = self.clear(leg)
+                if not known[key]:
+                    break
+                legs.append(leg)
+            else:
+                return legs
         direct = rest_to_rest(q0, q1, self.limits)
         self.require_clear(direct, what="transit")
         raise AssertionError("the direct route was not clear a moment ago")
-
-    def withdraw(self, q0: FloatArray) -> list[Segment]:
-        """Goes home from rest at `q0`, straight back from the wall first if need be.
-
-        Args:
-            q0: (5,) rad.
-
-        Returns:
-            The moves, first to last.
-
-        Raises:
-            CollisionError: Every route comes too near to something; tells where the
-                direct one does.
-        """
-        try:
-            return self.transit(q0, self.q_home)
-        except CollisionError as error:
-            failure = error
-        _, p_WGs = self.gun.kinematics.gun_poses(q0[None])
-        p_TG = self.gun.X_WT.inverse() @ p_WGs[0]
-        for distance in _WITHDRAWALS:
-            q = self.gun.solve(p_TG + np.array([0.0, 0.0, distance]))
-            if not self.limits.contains(q[None])[0]:
-                continue
-            back = rest_to_rest(q0, q, self.limits)
-            if self.clear(back):
-                try:
-                    return [back, *self.transit(q, self.q_home)]
-                except CollisionError:
-                    continue
-        raise failure
 
     def clear(self, segment: Segment) -> bool:
         """Returns whether a segment keeps its clearance all the way."""
@@ -196,6 +186,15 @@ class Linker(FrozenValue):
         needed = tops + self.space.clearance - standoff
         steps = np.unique(np.ceil(needed[needed > 0.0] / _HOP_STEP))
         return [0.0, *(steps * _HOP_STEP).tolist()]
+
+    def _drawn_back(self, q: FloatArray) -> list[FloatArray]:
+        """Returns the pose with the gun drawn farthest back from the wall, if any."""
+        _, p_WGs = self.gun.kinematics.gun_poses(q[None])
+        p_TG = self.gun.X_WT.inverse() @ p_WGs[0]
+        backs = self.gun.solve(p_TG + np.outer(_DRAWN_BACK, [0.0, 0.0, 1.0]))
+        good = self.limits.contains(backs)
+        good[good] = self.space.free(backs[good])
+        return [backs[int(np.argmax(good))]] if good.any() else []
 
     def _folded(self, yaw: float) -> FloatArray:
         """Returns the home pose turned to a yaw, the gun keeping its direction."""

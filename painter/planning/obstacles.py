@@ -141,7 +141,6 @@ class ClearSpace:
         # The checker knows one distance from all that is fixed in W: the boxes grow by
         # the difference.
         self._floor_clearance = floor_clearance
-        self._checker.SetPaddingAllRobotEnvironmentPairs(floor_clearance)
         grown = 2.0 * (clearance - floor_clearance)
         self._names: dict[int, str] = {}
         world = self._checker.plant().world_body()
@@ -155,8 +154,17 @@ class ClearSpace:
             )
             assert added, box.name
 
-    def free(self, q: FloatArray) -> BoolArray:
-        """Returns (n,) bool: which of the configurations q (n, 5) keep clear."""
+    def free(self, q: FloatArray, *, slack: float = 0.0) -> BoolArray:
+        """Tells which configurations keep clear.
+
+        Args:
+            q: (n, 5) rad.
+            slack: Taken off every clearance, m.
+
+        Returns:
+            (n,) bool.
+        """
+        self._checker.SetPaddingAllRobotEnvironmentPairs(self._floor_clearance - slack)
         answers = self._checker.CheckConfigsCollisionFree(
             list(np.asarray(q, float)), Parallelism(False)
         )
@@ -178,18 +186,21 @@ class ClearSpace:
         names = ["surroundings" if name == "world" else name for name in names]
         return f"{names[0]} and {names[1]}, {-1e3 * lacking[least]:.0f} mm too near"
 
-    def require(self, q: FloatArray, time: FloatArray, *, what: str) -> None:
+    def require(
+        self, q: FloatArray, time: FloatArray, *, what: str, slack: float = 0.0
+    ) -> None:
         """Raises if a sampled motion comes too near to anything.
 
         Args:
             q: (n, 5) rad.
             time: (n,) s.
             what: Name of the motion, for the message.
+            slack: Taken off every clearance, m.
 
         Raises:
             CollisionError: Names time, bodies, what they lack and the clearance.
         """
-        blocked = np.flatnonzero(~self.free(q))
+        blocked = np.flatnonzero(~self.free(q, slack=slack))
         if blocked.size == 0:
             return
         first = int(blocked[0])

@@ -1,6 +1,7 @@
 """From a segmentation to a paint program: strokes, their order in time, every move."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.planning import CollisionChecker
@@ -24,6 +25,7 @@ _STEP = 0.02  # m along a stroke, between the places that are looked at.
 # m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
 # the room in which the arm stops and turns at 0.6 m/s.
 _STOPPING = 0.12
+_TRIMS = (0.0, 0.02, 0.05, 0.10, 0.20)  # m, off a stroke's end for room to turn.
 
 
 def plan_program(
@@ -164,22 +166,15 @@ def _link(
     passes: list[int] = []
     skipped: list[SkippedStroke] = []
     last: Pass | None = None
-    for stroke in strokes:
-        ends = _nozzle(np.stack([stroke.start_T, stroke.end_T]), standoff)
-        this = Pass.between(ends[0], ends[1], stroke.speed)
-        try:
-            if last is None:
-                link = linker.from_rest(q0, this.start)
-            else:
-                link = linker.between(last.end, this.start)
-            linker.to_rest(this.end)  # Never go where there is no way back.
-        except (CollisionError, ReachError) as error:
-            skipped.append(SkippedStroke(stroke, str(error)))
+    for wanted in strokes:
+        fit = _fit(wanted, last, q0, linker, standoff)
+        skipped += fit.skipped
+        if fit.stroke is None:
             continue
-        path += [*link, ToolMove(this, linker.gun)]
+        last = _pass(fit.stroke, standoff)
+        path += [*fit.link, ToolMove(last, linker.gun)]
         passes.append(len(path) - 1)
-        done.append(stroke)
-        last = this
+        done.append(fit.stroke)
     if strokes and not done:
         raise CollisionError(f"no stroke can be come to: {skipped[0].reason}")
     q_end = q0
@@ -188,6 +183,63 @@ def _link(
         q_end = end_q(path[-1])
     path += linker.transit(q_end, linker.q_home)
     return path, tuple(done), passes, skipped
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """What can be done of a stroke, how it is come to, and what is left out."""
+
+    stroke: Stroke | None
+    link: list[Segment]
+    skipped: list[SkippedStroke]
+
+
+def _fit(
+    wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker, standoff: float
+) -> _Fit:
+    """Joins a stroke to the last pass, or to rest at `q0`, trimming it if need be.
+
+    In a corner of the tile, or close to the floor, there may be no room to turn at full
+    speed beyond a stroke's end; then the end is trimmed until there is.
+    """
+    trims = np.array(_TRIMS) / wanted.length
+    first_failure = ""
+    for end in range(len(trims)):
+        if trims[end] >= 1.0:
+            return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
+        stroke = _part(wanted, 0.0, 1.0 - trims[end])
+        try:
+            linker.to_rest(_pass(stroke, standoff).end)  # There must be a way back.
+            break
+        except (CollisionError, ReachError) as error:
+            first_failure = first_failure or str(error)
+    else:
+        return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
+    for begin in range(len(trims)):
+        if trims[begin] + trims[end] >= 1.0:
+            break
+        stroke = _part(wanted, trims[begin], 1.0 - trims[end])
+        start = _pass(stroke, standoff).start
+        try:
+            if last is None:
+                link = linker.from_rest(q0, start)
+            else:
+                link = linker.between(last.end, start)
+        except (CollisionError, ReachError) as error:
+            first_failure = first_failure or str(error)
+            continue
+        parts = ((0.0, trims[begin]), (1.0 - trims[end], 1.0))
+        left_out = [_part(wanted, a, b) for a, b in parts if b > a]
+        return _Fit(
+            stroke, link, [SkippedStroke(part, first_failure) for part in left_out]
+        )
+    return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
+
+
+def _pass(stroke: Stroke, standoff: float) -> Pass:
+    """Returns the nozzle's pass over a stroke."""
+    start, end = _nozzle(np.stack([stroke.start_T, stroke.end_T]), standoff)
+    return Pass.between(start, end, stroke.speed)
 
 
 def _nozzle(p_T: FloatArray, standoff: float) -> FloatArray:

@@ -5,11 +5,12 @@ of the D435's depth: 87 x 58 deg. Source: Intel RealSense D400 series data sheet
 2023, table 4-2 (848 x 480).
 """
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
-from painter.errors import ReachError
+from painter.errors import CollisionError, PainterError, ReachError
 from painter.planning.config import ScanConfig, TileConfig
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
 from painter.planning.joint_motion import Segment
@@ -22,6 +23,7 @@ _VFOV = np.deg2rad(58.0)
 _BASELINE = 0.050  # m; the left edge of a stereo depth image is blind for so much.
 _ROW_STEP = 0.01  # m, between the row heights that are tried.
 _POINT_STEP = 0.02  # m, between the places on a row that are looked at.
+_DISTANCE_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8)  # Of the scan distance, tried in turn.
 _SHORTEST_ROW = 0.05  # m; a row is a pass and a pass has a direction.
 
 
@@ -104,19 +106,34 @@ def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
     """Lays level camera rows over the tile, top row first, ending at its left.
 
     As few rows as cover the tile and its margin with at least the overlap wanted,
-    at heights where the arm reaches the whole row.
+    at heights where the arm reaches the whole row. Where the arm cannot fold back far
+    enough, the camera goes up to a fifth nearer to the wall.
 
     Args:
         tile: Size of the tile.
-        scan: Settings; distance, speed, overlap and margin are kept.
+        scan: Settings; speed, overlap and margin are kept.
         linker: Reach and clearance.
 
     Returns:
         Rows as passes of the nozzle.
 
     Raises:
-        ReachError: The camera cannot cover the tile; names height and distance.
+        ReachError: A row is out of reach at every distance; names its height.
+        CollisionError: A row comes too near to something; names its height.
     """
+    failure: PainterError | None = None
+    for share in _DISTANCE_SHARES:
+        nearer = dataclasses.replace(scan, distance=share * scan.distance)
+        try:
+            return _rows_at_distance(tile, nearer, linker)
+        except (CollisionError, ReachError) as error:
+            failure = failure or error
+    assert failure is not None
+    raise failure
+
+
+def _rows_at_distance(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
+    """Lays the rows with the camera exactly `scan.distance` from the wall."""
     view = view_at(scan.distance)
     left = -scan.margin + view.left
     right = tile.width + scan.margin - view.right

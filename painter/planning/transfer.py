@@ -85,7 +85,7 @@ def plan_transfer(
     elif goal == "look":
         path = linker.transit(q0, look_pose(tile, scan, linker))
     else:
-        path = linker.withdraw(q0)
+        path = linker.transit(q0, linker.q_home)
     planned = chain(path, period=motion.sample_period)
     verify_motion(
         planned,
