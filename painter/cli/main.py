@@ -91,9 +91,13 @@ def _root(
 
     Exit status: 0 done, 1 failed or aborted job, 2 wrong use or unusable input.
     """
+    handler = logging.StreamHandler()
+    # On the handler, because Drake sets its own logger to INFO when it is imported.
+    handler.setLevel(logging.INFO if verbose else logging.WARNING)
     logging.basicConfig(
-        level=logging.INFO if verbose else logging.WARNING,
+        level=logging.INFO,
         format="%(name)s: %(levelname)s: %(message)s",
+        handlers=[handler],
     )
 
 
