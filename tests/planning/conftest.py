@@ -1,0 +1,83 @@
+"""The robot of the models, and walls to plan for."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+from pydrake.planning import CollisionChecker
+
+from painter.diagrams.arm_model import (
+    GetArmKinematics,
+    GetArmLimits,
+    MakeArmPlant,
+    MakeCollisionChecker,
+)
+from painter.planning.config import MotionConfig, TileConfig
+from painter.planning.gun_path import SquareGun
+from painter.planning.joint_motion import planning_limits
+from painter.planning.kinematics import ArmKinematics, ArmLimits
+from painter.planning.linker import Linker
+from painter.planning.obstacles import ClearSpace, ObstacleBox, wall_box
+from painter.planning.tile import nominal_tile_pose
+from perception.values import WallSegmentation
+
+DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"
+
+
+@dataclasses.dataclass(frozen=True)
+class Robot:
+    """What planning knows of the robot; the fields are `plan_program`'s arguments."""
+
+    kinematics: ArmKinematics
+    limits: ArmLimits
+    checker: CollisionChecker
+
+    def linker(self, *boxes: ObstacleBox, X_WT: RigidTransform | None = None) -> Linker:
+        """A linker before the expected wall, with `boxes` on it."""
+        motion = MotionConfig()
+        X_WT = X_WT or nominal_tile_pose(TileConfig())
+        return Linker(
+            gun=SquareGun(self.kinematics, X_WT),
+            limits=planning_limits(self.limits, motion.limit_share),
+            space=ClearSpace(
+                self.checker,
+                X_WT=X_WT,
+                boxes=[wall_box(2.0, 2.0), *boxes],
+                clearance=motion.clearance,
+                floor_clearance=motion.floor_clearance,
+            ),
+            q_home=np.deg2rad(motion.home_deg),
+        )
+
+
+@pytest.fixture(scope="session")
+def robot() -> Robot:
+    plant = MakeArmPlant(DIRECTIVES)
+    return Robot(
+        kinematics=GetArmKinematics(plant),
+        limits=GetArmLimits(plant),
+        checker=MakeCollisionChecker(DIRECTIVES, clearance=0.04),
+    )
+
+
+@pytest.fixture
+def make_wall():
+    """Makes segmentations of the expected 2 x 2 m tile, 1 cm cells."""
+
+    def make(*patches: tuple[slice, slice, float], X_WT=None) -> WallSegmentation:
+        """`patches` are (rows, columns, depth in m): cells that are not wall."""
+        mask = np.ones((200, 200), dtype=bool)
+        depth = np.zeros((200, 200), dtype=np.float32)
+        for rows, columns, height in patches:
+            mask[rows, columns] = False
+            depth[rows, columns] = height
+        return WallSegmentation(
+            labels=np.where(mask, 1, 2).astype(np.uint16),
+            depth=depth,
+            wall_mask=mask,
+            X_WT=X_WT or nominal_tile_pose(TileConfig()),
+            cell=0.01,
+        )
+
+    return make
