@@ -17,7 +17,8 @@ from perception.values import FloatArray, FrozenValue
 
 # Share of the duration taken by each ramp of the acceleration.
 _RAMP = 0.15
-_KNOTS = np.array([0.0, _RAMP, 0.5 - _RAMP / 2, 0.5 + _RAMP / 2, 1.0 - _RAMP, 1.0])
+# Shares of the duration between which the acceleration is linear.
+KNOTS = np.array([0.0, _RAMP, 0.5 - _RAMP / 2, 0.5 + _RAMP / 2, 1.0 - _RAMP, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,20 +92,20 @@ def evaluate(
     ends = np.broadcast_to(start.a, first.shape), np.broadcast_to(end.a, first.shape)
     a = np.stack([ends[0], first, first, second, second, ends[1]], axis=1)
     T = durations[:, None, None]
-    h = np.diff(_KNOTS)[None, :, None] * T
+    h = np.diff(KNOTS)[None, :, None] * T
     jerk = np.diff(a, axis=1) / h
     v = np.empty_like(a)
     x = np.empty_like(a)
     v[:, 0], x[:, 0] = start.v, start.x
-    for i in range(len(_KNOTS) - 1):
+    for i in range(len(KNOTS) - 1):
         u = h[:, i]
         v[:, i + 1] = v[:, i] + u * (a[:, i] + u * jerk[:, i] / 2.0)
         x[:, i + 1] = x[:, i] + u * (
             v[:, i] + u * (a[:, i] / 2.0 + u * jerk[:, i] / 6.0)
         )
     inside = np.clip(s, 0.0, 1.0)
-    piece = np.clip(np.searchsorted(_KNOTS, inside, side="right") - 1, 0, 4)
-    u = (inside - _KNOTS[piece])[None, :, None] * T
+    piece = np.clip(np.searchsorted(KNOTS, inside, side="right") - 1, 0, 4)
+    u = (inside - KNOTS[piece])[None, :, None] * T
     a_i, j_i, v_i = a[:, piece], jerk[:, piece], v[:, piece]
     rate = v_i + u * (a_i + u * j_i / 2.0)
     place = x[:, piece] + u * (v_i + u * (a_i / 2.0 + u * j_i / 6.0))

@@ -97,7 +97,7 @@ class RasterConfig:
     speed: float = 0.6
     standoff: float = 0.30
     overlap_pitch: float = 0.0
-    lead: float = 0.02
+    lead: float = 0.005
     keepout_margin: float = 0.0
     min_stroke: float = 0.03
     wall_share: float = 0.5

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from pydrake.math import RigidTransform
 
-from painter.planning.blend import MovingState, evaluate
+from painter.planning.blend import KNOTS, MovingState, evaluate
 from painter.planning.joint_motion import SEARCH_SHARE, shortest
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from perception.values import BoolArray, FloatArray, FrozenValue
@@ -61,6 +61,11 @@ class Pass(FrozenValue):
         """Nozzle in T at its end."""
         return MovingState.steady(self.p0_TG + self.duration * self.v_TG, self.v_TG)
 
+    @property
+    def knots(self) -> FloatArray:
+        """Its start and its end, s."""
+        return np.array([0.0, self.duration])
+
     def p_TG(self, time: FloatArray) -> FloatArray:
         """Returns (n, 3) m, in T, at `time` (n,) s."""
         return self.p0_TG + np.asarray(time)[:, None] * self.v_TG
@@ -84,6 +89,12 @@ class ToolBlend(FrozenValue):
     hop: float = 0.0
     rise: float = 0.5
 
+    @property
+    def knots(self) -> FloatArray:
+        """Times where its third derivative steps, s."""
+        ends_of_hop = [self.rise, 1.0 - self.rise] if self.hop else []
+        return self.duration * np.union1d(KNOTS, ends_of_hop)
+
     def p_TG(self, time: FloatArray) -> FloatArray:
         """Returns (n, 3) m, in T, at `time` (n,) s."""
         s = np.asarray(time) / self.duration
@@ -98,6 +109,10 @@ class ToolPath(Protocol):
     @property
     def duration(self) -> float:
         """Length in time, s."""
+
+    @property
+    def knots(self) -> FloatArray:
+        """Times from 0 to `duration` between which it is smooth throughout, s."""
 
     def p_TG(self, time: FloatArray) -> FloatArray:
         """Returns (n, 3) m, in T, at `time` (n,) s."""
@@ -159,6 +174,11 @@ class ToolMove(FrozenValue):
     def duration(self) -> float:
         """Length in time, s."""
         return self.path.duration
+
+    @property
+    def knots(self) -> FloatArray:
+        """See `Segment.knots`."""
+        return self.path.knots
 
     def q(self, time: FloatArray) -> FloatArray:
         """See `Segment.q`."""

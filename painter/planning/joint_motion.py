@@ -1,5 +1,6 @@
 """Joint-space motion: blends within the joints' limits, and chaining into a Motion."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -7,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from painter.planning.blend import MovingState, evaluate, plateaus
+from painter.planning.blend import KNOTS, MovingState, evaluate, plateaus
 from painter.planning.kinematics import ArmLimits
 from painter.planning.spray_path import Motion
 from perception.values import BoolArray, FloatArray, FrozenValue
@@ -16,9 +17,8 @@ _POSITION_MARGIN = 0.02  # rad, kept off a joint's end by plans.
 _SHORTEST_MOVE = 0.05  # s; a move of no length still lasts a few samples.
 _LONGEST_BLEND = 8.0  # s
 _SAMPLES = 33  # Of a blend, where its rates are looked at.
-# The peak between two samples, and the spline through a motion's samples, may exceed
-# what is seen at them a little.
-SEARCH_SHARE = 0.96
+# The peak between two samples may exceed what is seen at them a little.
+SEARCH_SHARE = 0.98
 
 
 class Segment(Protocol):
@@ -27,6 +27,10 @@ class Segment(Protocol):
     @property
     def duration(self) -> float:
         """Length in time, s."""
+
+    @property
+    def knots(self) -> FloatArray:
+        """Times from 0 to `duration` between which it is smooth throughout, s."""
 
     def q(self, time: FloatArray) -> FloatArray:
         """Returns (n, 5) rad at `time` (n,) s from the segment's own start."""
@@ -45,6 +49,11 @@ class JointBlend(FrozenValue):
     start: MovingState
     end: MovingState
     duration: float
+
+    @property
+    def knots(self) -> FloatArray:
+        """See `Segment.knots`."""
+        return np.asarray(KNOTS * self.duration)
 
     def q(self, time: FloatArray) -> FloatArray:
         """See `Segment.q`."""
@@ -148,7 +157,8 @@ def chain(
 
     The velocities are those of the clamped cubic spline through the samples, so that
     the motion's cubic Hermite curve *is* that spline: continuous to the second
-    derivative, at rest at both ends.
+    derivative, at rest at both ends. There is a sample at every knot: a spline across
+    a bend of the acceleration would swing beyond it.
 
     Args:
         segments: At least one; the first starts and the last ends at rest.
@@ -156,22 +166,28 @@ def chain(
         spray_on: (m, 2) s, see `Motion.spray_on`; None = the gun stays closed.
 
     Returns:
-        The motion, evenly sampled.
+        The motion.
     """
     starts = start_times(segments)
-    total = float(starts[-1])
-    count = max(3, int(np.ceil(total / period - 1e-9)) + 1)
-    time = np.linspace(0.0, total, count)
-    owner = np.searchsorted(starts[1:-1], time, side="right")
-    q = np.empty((count, 5))
-    for index, segment in enumerate(segments):
-        mine = owner == index
-        if mine.any():
-            q[mine] = segment.q(time[mine] - starts[index])
+    times, places = [np.zeros(1)], [segments[0].q(np.zeros(1))]
+    for segment, start in zip(segments, starts, strict=False):
+        local = _sample_times(segment.knots, period)
+        times.append(start + local)
+        places.append(segment.q(local))
+    time, q = np.concatenate(times), np.concatenate(places)
     v = CubicSpline(time, q, bc_type="clamped")(time, 1)
     v[[0, -1]] = 0.0
     spray = np.zeros((0, 2)) if spray_on is None else spray_on
     return Motion(time=time, q=q, v=v, spray_on=spray)
+
+
+def _sample_times(knots: FloatArray, period: float) -> FloatArray:
+    """Returns times after the first knot, each knot among them, `period` or less apart."""
+    pieces = [
+        np.linspace(a, b, max(1, int(np.ceil((b - a) / period - 1e-9))) + 1)[1:]
+        for a, b in itertools.pairwise(knots)
+    ]
+    return np.concatenate(pieces)
 
 
 def start_times(segments: Sequence[Segment]) -> FloatArray:

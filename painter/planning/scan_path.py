@@ -63,14 +63,37 @@ def nozzle_under_camera(p_TCs: FloatArray, gun: SquareGun) -> FloatArray:
     return np.asarray(p_TCs + np.array([-left, above, -ahead]))
 
 
-def look_pose(tile: TileConfig, scan: ScanConfig, linker: Linker) -> FloatArray:
-    """Finds the pose for first sight: near the tile's centre, where the arm can stand.
+def look_segments(
+    q0: FloatArray, tile: TileConfig, scan: ScanConfig, linker: Linker
+) -> list[Segment]:
+    """Plans first sight: from rest at `q0` (5,), rad, over two quarters of the tile.
+
+    One look at the middle would do for a bare wall; where there is a window in the
+    middle it would show anything but the wall. Two quarters that lie across from one
+    another give the wall's tilt about both axes.
+
+    Raises:
+        ReachError: The camera can stand before a quarter nowhere.
+        CollisionError: There is no clear way.
+    """
+    path: list[Segment] = []
+    q = q0
+    # Ends at the upper left, where the scan begins.
+    for x, y in ((0.75, 0.25), (0.25, 0.75)):
+        q_next = look_pose(np.array([x * tile.width, y * tile.height]), scan, linker)
+        path += linker.transit(q, q_next)
+        q = q_next
+    return path
+
+
+def look_pose(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatArray:
+    """Finds the pose that looks nearest to a place, where the arm can stand.
 
     Straight before the shoulder the arm would have to fold flat, so the nearest place
-    beside, above or below the centre is taken.
+    within half a metre beside, above or below is taken.
 
     Args:
-        tile: Size of the tile.
+        centre_T: (2,) m, in T's x and y.
         scan: Settings; `look_distance` is kept.
         linker: Reach and clearance.
 
@@ -78,25 +101,19 @@ def look_pose(tile: TileConfig, scan: ScanConfig, linker: Linker) -> FloatArray:
         (5,) rad.
 
     Raises:
-        ReachError: The camera can stand at that distance nowhere before the tile.
+        ReachError: The camera can stand at that distance nowhere near.
     """
-    x, y = np.meshgrid(
-        np.arange(-0.5, 0.55, 0.1) * tile.width,
-        np.arange(-0.5, 0.525, 0.05) * tile.height,
-    )
+    x, y = np.meshgrid(np.arange(-0.5, 0.55, 0.1), np.arange(-0.5, 0.525, 0.05))
     offsets = np.stack([x.ravel(), y.ravel()], axis=-1)
     nearest_first = np.argsort(np.linalg.norm(offsets, axis=1), kind="stable")
     p_TCs = np.column_stack(
-        [
-            offsets[nearest_first] + [tile.width / 2.0, tile.height / 2.0],
-            np.full(len(offsets), scan.look_distance),
-        ]
+        [centre_T + offsets[nearest_first], np.full(len(offsets), scan.look_distance)]
     )
     good = _standable(nozzle_under_camera(p_TCs, linker.gun), linker)
     if not good.any():
         raise ReachError(
             f"look: no clear pose with the camera {scan.look_distance:.2f} m before "
-            f"the tile."
+            f"the wall within 0.5 m of T ({centre_T[0]:.2f}, {centre_T[1]:.2f}) m."
         )
     p_TG = nozzle_under_camera(p_TCs[[int(np.argmax(good))]], linker.gun)
     return np.array(linker.gun.solve(p_TG)[0])

@@ -14,7 +14,7 @@ from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.linker import Linker
 from painter.planning.obstacles import ClearSpace, wall_box
 from painter.planning.reach import require_reach, tile_points
-from painter.planning.scan_path import look_pose, scan_segments
+from painter.planning.scan_path import look_segments, scan_segments
 from painter.planning.spray_path import Motion
 from painter.planning.verify import verify_motion
 from perception.values import FloatArray
@@ -42,8 +42,8 @@ def plan_transfer(
     painted from where the arm stands, so that a job that cannot be done ends at once.
 
     Args:
-        goal: "home" or "retract": to the home pose; "look": to where the camera sees
-            the tile; "scan": along rows over the tile.
+        goal: "home" or "retract": to the home pose; "look": over two
+            quarters of the tile; "scan": along rows over the tile.
         q0: (5,) rad, where the arm stands, at rest.
         X_WT: Tile frame T in W, as expected or as found.
         standoff: Of the gun when it paints, m.
@@ -83,7 +83,7 @@ def plan_transfer(
     if goal == "scan":
         path = scan_segments(q0, tile, scan, linker)
     elif goal == "look":
-        path = linker.transit(q0, look_pose(tile, scan, linker))
+        path = look_segments(q0, tile, scan, linker)
     else:
         path = linker.transit(q0, linker.q_home)
     planned = chain(path, period=motion.sample_period)

@@ -205,7 +205,7 @@ class PaintCycle(LeafSystem):
         now = self._GetState(context)
         step = SEQUENCE[now.step]
         looking = step.action == Action.HOLD or (
-            step.phase == Phase.SCAN and now.moving
+            step.phase in (Phase.LOOK, Phase.SCAN) and now.moving
         )
         output.SetAtIndex(0, float(looking and now.status.phase == step.phase))
 
