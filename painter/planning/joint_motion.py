@@ -182,7 +182,7 @@ def chain(
 
 
 def _sample_times(knots: FloatArray, period: float) -> FloatArray:
-    """Returns times after the first knot, each knot among them, `period` or less apart."""
+    """Returns times after the first knot, knots among them, `period` or less apart."""
     pieces = [
         np.linspace(a, b, max(1, int(np.ceil((b - a) / period - 1e-9))) + 1)[1:]
         for a, b in itertools.pairwise(knots)

@@ -104,7 +104,7 @@ class Linker(FrozenValue):
             q1: (5,) rad.
 
         Returns:
-            The moves, first to last.
+            The moves of the quickest clear route, first to last.
 
         Raises:
             CollisionError: Every route comes too near to something; tells where the
@@ -122,19 +122,23 @@ class Linker(FrozenValue):
             [*folds, *forth],
             [*back, *folds, *forth],
         )
-        known: dict[tuple[int, int], bool] = {}
+        known: dict[tuple[int, int], Segment] = {}
+        plans: list[list[Segment]] = []
         for via in routes:
-            stops = [q0, *via, q1]
             legs: list[Segment] = []
-            for a, b in itertools.pairwise(stops):
-                leg = rest_to_rest(a, b, self.limits)
-                # Routes share legs; checking one for clearance is what takes time.
+            for a, b in itertools.pairwise([q0, *via, q1]):
+                # Routes share legs, and to check one for clearance takes time.
                 key = (id(a), id(b))
-                if key not in known:
-                    known[key] = self.clear(leg)
-                if not known[key]:
+                known.setdefault(key, rest_to_rest(a, b, self.limits))
+                legs.append(known[key])
+            plans.append(legs)
+        clear: dict[int, bool] = {}
+        for legs in sorted(plans, key=lambda legs: sum(leg.duration for leg in legs)):
+            for leg in legs:
+                if id(leg) not in clear:
+                    clear[id(leg)] = self.clear(leg)
+                if not clear[id(leg)]:
                     break
-                legs.append(leg)
             else:
                 return legs
         direct = rest_to_rest(q0, q1, self.limits)

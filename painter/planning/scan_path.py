@@ -13,7 +13,7 @@ import numpy as np
 from painter.errors import CollisionError, PainterError, ReachError
 from painter.planning.config import ScanConfig, TileConfig
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
-from painter.planning.joint_motion import Segment
+from painter.planning.joint_motion import SEARCH_SHARE, Segment
 from painter.planning.linker import Linker
 from painter.planning.reach import require_reach
 from perception.values import FloatArray, FrozenValue
@@ -124,11 +124,12 @@ def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
 
     As few rows as cover the tile and its margin with at least the overlap wanted,
     at heights where the arm reaches the whole row. Where the arm cannot fold back far
-    enough, the camera goes up to a fifth nearer to the wall.
+    enough, the camera goes up to a fifth nearer to the wall; where a joint could not
+    follow, it goes slower.
 
     Args:
         tile: Size of the tile.
-        scan: Settings; speed, overlap and margin are kept.
+        scan: Settings; overlap and margin are kept.
         linker: Reach and clearance.
 
     Returns:
@@ -164,7 +165,8 @@ def _rows_at_distance(tile: TileConfig, scan: ScanConfig, linker: Linker) -> lis
         x0, x1 = (left, right) if rightwards else (right, left)
         p_TCs = np.array([[x0, height, scan.distance], [x1, height, scan.distance]])
         p_TGs = nozzle_under_camera(p_TCs, linker.gun)
-        rows.append(Pass.between(p_TGs[0], p_TGs[1], scan.speed))
+        row = Pass.between(p_TGs[0], p_TGs[1], scan.speed)
+        rows.append(_slowed(row, linker))
         rightwards = not rightwards
     return rows
 
@@ -224,6 +226,24 @@ def _row_heights(
         else:
             heights.append(found)
     return heights
+
+
+def _slowed(row: Pass, linker: Linker) -> Pass:
+    """Returns the row at the speed that the joints can follow, if that is less.
+
+    Close before the base axis a camera moving sideways takes a fast yaw.
+    """
+    count = int(row.duration * np.linalg.norm(row.v_TG) / _POINT_STEP) + 5
+    time = np.linspace(0.0, row.duration, count)
+    v = np.gradient(linker.gun.solve(row.p_TG(time)), time, axis=0)
+    a = np.gradient(v, time, axis=0)
+    limits = linker.limits
+    slower = max(
+        1.0,
+        float(np.max(np.abs(v) / limits.v_max)) / SEARCH_SHARE,
+        float(np.sqrt(np.max(np.abs(a) / limits.a_max) / SEARCH_SHARE)),
+    )
+    return Pass(row.p0_TG, row.v_TG / slower, row.duration * slower)
 
 
 def _row_points(

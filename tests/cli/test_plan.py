@@ -1,0 +1,79 @@
+"""`painter plan` from the words on the command line to the files."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+from pydrake.math import RigidTransform
+
+from painter.cli.main import run
+from painter.planning.config import TileConfig
+from painter.planning.store import load_program
+from painter.planning.tile import nominal_tile_pose
+from perception.store import save_segmentation
+from perception.values import WallSegmentation
+
+
+def segmentation(path, X_WT):
+    mask = np.ones((200, 200), dtype=bool)
+    mask[80:160, 60:140] = False
+    content = WallSegmentation(
+        labels=np.where(mask, 1, 2).astype(np.uint16),
+        depth=np.where(mask, 0.0, -0.1).astype(np.float32),
+        wall_mask=mask,
+        X_WT=X_WT,
+        cell=0.01,
+    )
+    save_segmentation(path, content)
+    return str(path)
+
+
+@pytest.fixture
+def wall(tmp_path):
+    return segmentation(tmp_path / "wall.npz", nominal_tile_pose(TileConfig()))
+
+
+def test_folder_holds_the_program(wall, tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["plan", wall, "--out", str(out), "--set", "raster.speed=0.5", "--json"]
+    assert run(words) == 0
+    names = {path.name for path in out.iterdir()}
+    assert names == {"program.json", "trajectory.npz", "program.png"}
+    program = load_program(out)
+    assert {stroke.speed for stroke in program.strokes} == {0.5}
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["strokes"] == len(program.strokes)
+    assert summary["duration"] == pytest.approx(program.motion.duration)
+    picture = np.array(Image.open(out / "program.png").convert("RGB"))
+    assert min(picture.shape[:2]) > 400
+    assert picture.std() > 10.0  # There is something on it.
+
+
+def test_wall_out_of_reach_leaves_nothing_behind(tmp_path, capsys):
+    far = segmentation(tmp_path / "far.npz", RigidTransform([0.0, 0.0, 5.0]))
+    assert run(["plan", far, "--out", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "out of reach" in error
+    assert "the arm has 1.57 m" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["far.npz"]
+
+
+def test_recorded_wall_can_be_planned_where_the_scenario_expects_it(tmp_path):
+    recorded = segmentation(tmp_path / "cloud.npz", RigidTransform())
+    out = tmp_path / "out"
+    assert run(["plan", recorded, "--expected-wall", "--out", str(out)]) == 0
+    expected = nominal_tile_pose(TileConfig())
+    assert load_program(out).X_WT.IsNearlyEqualTo(expected, 1e-12)
+
+
+def test_unusable_input_is_one_line_and_exit_2(wall, tmp_path, capsys):
+    out = str(tmp_path / "out")
+    for words, text in (
+        ([str(tmp_path / "none.npz")], "none.npz: no such file"),
+        ([wall, "--scenario", "nowhere"], "'nowhere' is unknown"),
+        ([wall, "--set", "raster.sped=1"], "sped"),
+    ):
+        assert run(["plan", *words, "--out", out]) == 2
+        (line,) = capsys.readouterr().err.strip().splitlines()
+        assert text in line

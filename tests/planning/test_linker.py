@@ -1,0 +1,88 @@
+"""Moves between strokes: over what stands in the way, or round it."""
+
+import numpy as np
+import pytest
+
+from painter.errors import CollisionError
+from painter.planning.blend import MovingState
+from painter.planning.gun_path import ToolMove
+from painter.planning.linker import end_q, start_q
+from painter.planning.obstacles import ObstacleBox
+
+UP = np.array([0.0, 0.6, 0.0])
+# Taller than the stand-off: the gun cannot pass under its own clearance.
+TALL = ObstacleBox("tall", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.0, 0.32]))
+
+
+def nozzle(linker, segment):
+    """Places of the nozzle in T along a segment, (n, 3) m."""
+    q = segment.q(np.linspace(0.0, segment.duration, 400))
+    _, p_WGs = linker.gun.kinematics.gun_poses(q)
+    return (linker.gun.X_WT.inverse() @ p_WGs.T).T
+
+
+def test_hop_clears_a_tall_box_between_two_strokes(robot):
+    linker = robot.linker(TALL)
+    start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
+    end = MovingState.steady(np.array([1.0, 1.25, 0.3]), UP)
+    (move,) = linker.between(start, end)
+    assert isinstance(move, ToolMove)
+    places = nozzle(linker, move)
+    over = (places[:, 1] > 0.9) & (places[:, 1] < 1.0)
+    assert over.any()
+    assert places[over, 2].min() > 0.32 + 0.04  # Its top and the clearance.
+    np.testing.assert_allclose(places[[0, -1]], [start.x, end.x], atol=1e-9)
+
+
+def test_nothing_in_the_way_needs_no_hop(robot):
+    linker = robot.linker()
+    start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
+    end = MovingState.steady(np.array([1.0, 1.25, 0.3]), UP)
+    (move,) = linker.between(start, end)
+    assert move.duration < 1.0  # 0.6 m at 0.6 m/s, or faster.
+    assert nozzle(linker, move)[:, 2].min() > 0.25
+
+
+# Corners at the top; at the bottom, where the floor is near, one line further in.
+@pytest.mark.parametrize(
+    ("x", "y", "sign"),
+    [
+        (0.07, 2.02, 1),
+        (1.0, 2.02, 1),
+        (1.93, 2.02, 1),
+        (0.33, 0.0, -1),
+        (1.0, 0.0, -1),
+    ],
+)
+def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
+    linker = robot.linker()
+    start = MovingState.steady(np.array([x, y, 0.3]), sign * UP)
+    step = 0.13 if x < 1.5 else -0.13
+    end = MovingState.steady(np.array([x + step, y, 0.3]), -sign * UP)
+    moves = linker.between(start, end)
+    assert len(moves) == 1
+    (turn,) = moves
+    np.testing.assert_allclose(start_q(turn), linker.gun.joint_state(start).x)
+    np.testing.assert_allclose(end_q(turn), linker.gun.joint_state(end).x)
+    # The gun is square all along the turn: pitches and yaws add up to zero.
+    q = turn.q(np.linspace(0.0, turn.duration, 100))
+    np.testing.assert_allclose(q[:, 1:4].sum(axis=1), 0.0, atol=1e-6)
+    np.testing.assert_allclose(q[:, 0] + q[:, 4], 0.0, atol=1e-6)
+
+
+def test_transit_goes_round_what_blocks_the_straight_way(robot):
+    wall = ObstacleBox("rib", np.array([0.95, 0.0, 0.0]), np.array([1.05, 2.0, 0.40]))
+    linker = robot.linker(wall)
+    q0, q1 = linker.gun.solve(np.array([[0.5, 1.0, 0.3], [1.5, 1.0, 0.3]]))
+    legs = linker.transit(q0, q1)
+    assert len(legs) > 1
+    np.testing.assert_allclose(start_q(legs[0]), q0)
+    np.testing.assert_allclose(end_q(legs[-1]), q1)
+    assert all(linker.clear(leg) for leg in legs)
+
+
+def test_no_way_out_of_a_collision(robot):
+    linker = robot.linker(TALL)
+    (inside,) = linker.gun.solve(np.array([[1.0, 0.95, 0.3]]))
+    with pytest.raises(CollisionError, match="transit: .* at 0.00 s"):
+        linker.transit(inside, linker.q_home)

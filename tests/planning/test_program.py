@@ -1,0 +1,149 @@
+"""Paint programs: strokes at their speed, place and time, nothing touched."""
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from painter.errors import MotionLimitError, ReachError
+from painter.planning.config import MotionConfig, RasterConfig, TipConfig
+from painter.planning.program import plan_program
+from painter.planning.spray_path import Motion
+from painter.planning.verify import verify_motion, verify_strokes
+
+HOME = np.deg2rad(MotionConfig().home_deg)
+WINDOW = (slice(80, 160), slice(60, 140), -0.1)
+LOW_BOX = (slice(30, 45), slice(20, 40), 0.12)
+TALL_BOX = (slice(30, 45), slice(20, 40), 0.40)
+
+
+def plan(robot, wall, **settings):
+    arguments = {
+        "kinematics": robot.kinematics,
+        "limits": robot.limits,
+        "checker": robot.checker,
+        "tip": TipConfig(),
+        "raster": RasterConfig(),
+        "motion": MotionConfig(),
+    }
+    return plan_program(wall, HOME, **arguments | settings)
+
+
+def gun_in_tile(robot, program, time):
+    """Nozzle (n, 3) and spray axis (n, 3) in T along the executed spline."""
+    q = program.motion.trajectory.vector_values(time).T
+    R_WGs, p_WGs = robot.kinematics.gun_poses(q)
+    X_TW = program.X_WT.inverse()
+    return (X_TW @ p_WGs.T).T, (X_TW.rotation().matrix() @ R_WGs[:, :, 2].T).T
+
+
+@pytest.fixture(scope="module")
+def wall_with_openings():
+    return WINDOW, LOW_BOX, (slice(100, 120), slice(160, 170), 0.05)
+
+
+@pytest.fixture
+def program(robot, make_wall, wall_with_openings):
+    return plan(robot, make_wall(*wall_with_openings))
+
+
+def test_strokes_run_at_constant_speed_square_and_in_place(robot, program):
+    assert len(program.strokes) > 15
+    assert program.skipped == ()
+    for stroke, (on, off) in zip(program.strokes, program.motion.spray_on, strict=True):
+        start, end = on + 0.02, off + 0.02  # The valve's delay, both ways.
+        assert end - start == pytest.approx(stroke.length / 0.6, rel=1e-9)
+        time = np.linspace(start, end, 400)
+        places, axes = gun_in_tile(robot, program, time)
+        ideal = np.linspace(stroke.start_T, stroke.end_T, 400)
+        # 0.1 % of the speed over a stroke of 2 m; the spline is good to some 10 µm.
+        np.testing.assert_allclose(places[:, :2], ideal, atol=2e-4)
+        np.testing.assert_allclose(places[:, 2], 0.3, atol=2e-4)
+        np.testing.assert_allclose(axes, [[0.0, 0.0, -1.0]] * 400, atol=1e-3)
+        inside = slice(20, -20)
+        speed = np.linalg.norm(np.gradient(places, time, axis=0), axis=1)[inside]
+        np.testing.assert_allclose(speed, 0.6, rtol=1e-3)
+
+
+def test_motion_starts_here_ends_at_home_and_keeps_every_limit(robot, program):
+    motion = program.motion
+    np.testing.assert_allclose(motion.q[[0, -1]], [HOME, HOME], atol=1e-9)
+    assert not motion.v[[0, -1]].any()
+    time = np.linspace(0.0, motion.duration, 40000)
+    derivatives = (
+        motion.trajectory.MakeDerivative(k).vector_values(time).T for k in (1, 2)
+    )
+    for values, bound in zip(
+        derivatives, (robot.limits.v_max, robot.limits.a_max), strict=True
+    ):
+        assert (np.abs(values) <= 0.93 * bound).all()  # 0.9 of them, and the spline.
+    assert robot.limits.contains(motion.q).all()
+
+
+def test_motion_stays_clear_of_the_boxes_as_mapped(robot, make_wall, program):
+    # Independently of the planner's boxes: the nozzle over the grid's heights.
+    wall = make_wall(WINDOW, LOW_BOX)
+    places, _ = gun_in_tile(robot, program, program.motion.time)
+    row, column = (np.floor(places[:, i] / 0.01).astype(int) for i in (1, 0))
+    over = (row >= 0) & (row < 200) & (column >= 0) & (column < 200)
+    gap = places[over, 2] - np.asarray(wall.depth)[row[over], column[over]]
+    assert gap.min() > 0.04
+
+
+def test_blank_tile_takes_no_longer_than_its_strokes_and_turns(robot, make_wall):
+    program = plan(robot, make_wall())
+    spraying = sum(stroke.length for stroke in program.strokes) / 0.6
+    turns = len(program.strokes) - 1
+    # A turn reverses 0.6 m/s at 3 m/s² or so; approach and way home take the rest.
+    assert program.motion.duration < spraying + 0.9 * turns + 6.0
+    assert program.motion.duration < 72.0
+    litres = 1.517e-5 * spraying * 1e3
+    assert 1e3 * program.paint_volume == pytest.approx(litres)
+
+
+def test_strokes_beside_a_tall_box_are_cut_back_and_reported(robot, make_wall):
+    program = plan(robot, make_wall(TALL_BOX))
+    assert program.skipped
+    for item in program.skipped:
+        assert "too near" in item.reason
+        assert 0.0 <= min(item.stroke.start_T[0], item.stroke.end_T[0]) <= 0.55
+    done = sum(stroke.length for stroke in program.strokes)
+    left_out = sum(item.stroke.length for item in program.skipped)
+    assert left_out < 0.1 * done
+    # No nozzle over the box lower than its top and the clearance.
+    places, _ = gun_in_tile(robot, program, program.motion.time)
+    over = (abs(places[:, 0] - 0.3) < 0.1) & (abs(places[:, 1] - 0.375) < 0.075)
+    assert places[over, 2].min(initial=np.inf) > 0.44
+
+
+def test_wall_out_of_reach_names_the_distances(robot, make_wall):
+    far = RigidTransform([0.4, 0.0, 0.0]) @ make_wall().X_WT
+    with pytest.raises(ReachError, match=r"needs 1\.\d+ m .* the arm has 1\.57 m"):
+        plan(robot, make_wall(X_WT=far))
+
+
+def test_nothing_to_paint_is_a_program_without_strokes(robot, make_wall):
+    program = plan(robot, make_wall((slice(0, 200), slice(0, 200), 0.0)))
+    assert program.strokes == ()
+    assert program.motion.spray_on.shape == (0, 2)
+
+
+def test_verification_finds_a_stroke_that_is_out_of_time(robot, program):
+    motion = program.motion
+    late = program.replace(
+        motion=Motion(motion.time, motion.q, motion.v, motion.spray_on + 0.1)
+    )
+    with pytest.raises(MotionLimitError, match="stroke 1: "):
+        verify_strokes(late, kinematics=robot.kinematics, valve_delay=0.02)
+
+
+def test_verification_finds_a_motion_that_is_too_fast(robot, program):
+    motion = program.motion
+    fast = Motion(motion.time / 2, motion.q, motion.v * 2, motion.spray_on / 2)
+    with pytest.raises(MotionLimitError, match=r"rush: \w+ of .* allowed is"):
+        verify_motion(
+            fast,
+            limits=robot.limits,
+            limit_share=0.9,
+            space=robot.linker().space,
+            what="rush",
+        )
