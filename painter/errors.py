@@ -1,4 +1,4 @@
-"""Errors that Painter reports in one line; every one names what, where and the bound."""
+"""Errors that Painter reports in one line: what, where, and the bound."""
 
 
 class PainterError(Exception):

@@ -107,11 +107,15 @@ def write_log(folder: RunFolder, scenario: Scenario, log: CycleLog) -> None:
         scenario: The job.
         log: What it left.
     """
-    bound = max(scenario.motion.clearance - CLEARANCE_TOLERANCE, 0.0)
-    for when, distance in clearance_violations(
-        log.clearance_time, log.clearance, bound
+    for distances, planned in (
+        (log.clearance, scenario.motion.clearance),
+        (log.floor_clearance, scenario.motion.floor_clearance),
     ):
-        folder.log(when, "collision", distance_m=distance, bound_m=bound)
+        bound = max(planned - CLEARANCE_TOLERANCE, 0.0)
+        for when, distance in clearance_violations(
+            log.clearance_time, distances, bound
+        ):
+            folder.log(when, "collision", distance_m=distance, bound_m=bound)
     folder.save_map(log.surface_map)
     folder.save_executed(
         Executed(

@@ -23,6 +23,9 @@ JOINT_NAMES = (
 )
 # Model instances that move; the frame and whatever is added to W are surroundings.
 ROBOT_MODELS = ("arm", "gun", "camera")
+# The floor that the frame stands on, W z = 0.
+FLOOR = Box(8.0, 8.0, 0.1)
+X_W_FLOOR = RigidTransform([0.0, 0.0, -0.05])
 # Distance at which two parts of the robot count as touching, m: less than the least
 # gap of the design (1 cm, wrist flange to fork), more than its tolerances.
 SELF_CLEARANCE = 0.005
@@ -140,11 +143,7 @@ def MakeCollisionChecker(
         env_collision_padding=clearance,
         self_collision_padding=self_clearance,
     )
-    thickness = 0.1
     checker.AddCollisionShapeToBody(
-        "floor",
-        checker.plant().world_body(),
-        Box(8.0, 8.0, thickness),
-        RigidTransform([0.0, 0.0, -thickness / 2]),
+        "floor", checker.plant().world_body(), FLOOR, X_W_FLOOR
     )
     return checker

@@ -20,7 +20,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant
 from pydrake.systems.controllers import InverseDynamicsController
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
@@ -32,7 +32,9 @@ from pydrake.systems.sensors import RgbdSensor
 
 from painter.config import Scenario
 from painter.diagrams.arm_model import (
+    FLOOR,
     ROBOT_MODELS,
+    X_W_FLOOR,
     AddRobot,
     GetArmKinematics,
     MakeArmPlant,
@@ -71,8 +73,9 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
 
     Returns:
         A diagram with the ports of `painter.diagrams.station` and these `cheat.*`
-        outputs: `state` (10,) true q, v; `X_WG` true gun pose; `clearance` (1,) m;
-        `film` FilmState; `query_object`.
+        outputs: `state` (10,) true q, v; `X_WG` true gun pose; `film` FilmState;
+        `clearance` (1,) m, from the scene, and `floor_clearance` from floor and frame;
+        `query_object`.
     """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(scenario.plant_config, builder)
@@ -84,13 +87,7 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
     _AddDrives(builder, plant, scenario)
     camera = _AddWallCamera(builder, plant, scene_graph, scenario)
     _AddGun(builder, plant, scenario, camera)
-    monitor = builder.AddNamedSystem(
-        "clearance_monitor", ClearanceMonitor(robot=_RobotGeometries(plant))
-    )
-    query_port = scene_graph.get_query_output_port()
-    builder.Connect(query_port, monitor.GetInputPort("query_object"))
-    builder.ExportOutput(monitor.GetOutputPort("clearance"), "cheat.clearance")
-    builder.ExportOutput(query_port, "cheat.query_object")
+    _AddClearance(builder, plant, scene_graph)
     builder.ExportOutput(plant.get_state_output_port(arm), "cheat.state")
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
@@ -112,16 +109,44 @@ def _AddScene(plant: MultibodyPlant, scenario: Scenario) -> None:
     folder = tempfile.mkdtemp(dir=_SceneFiles().name)
     Parser(plant).AddModelsFromString(scene_sdf(scene, Path(folder)), "sdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("scene"), X_WS)
-
-
-def _RobotGeometries(plant: MultibodyPlant) -> frozenset:
-    models = [plant.GetModelInstanceByName(name) for name in ROBOT_MODELS]
-    return frozenset(
-        geometry
-        for model in models
-        for body in plant.GetBodyIndices(model)
-        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), X_W_FLOOR, FLOOR, "floor", CoulombFriction(0.8, 0.8)
     )
+
+
+def _AddClearance(
+    builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph
+) -> None:
+    """Adds monitors of the robot's distance from the scene, and from floor and frame.
+
+    The base stands on the frame, so that one is not asked about.
+    """
+    base = plant.GetBodyByName("base", plant.GetModelInstanceByName("arm"))
+
+    def geometries(*models: str) -> frozenset:
+        return frozenset(
+            geometry
+            for model in models
+            for body in plant.GetBodyIndices(plant.GetModelInstanceByName(model))
+            if body != base.index()
+            for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
+        )
+
+    floor = frozenset(plant.GetCollisionGeometriesForBody(plant.world_body()))
+    query_port = scene_graph.get_query_output_port()
+    for name, surroundings in (
+        ("clearance", geometries("scene")),
+        ("floor_clearance", geometries("frame") | floor),
+    ):
+        monitor = builder.AddNamedSystem(
+            f"{name}_monitor",
+            ClearanceMonitor(
+                robot=geometries(*ROBOT_MODELS), surroundings=surroundings
+            ),
+        )
+        builder.Connect(query_port, monitor.GetInputPort("query_object"))
+        builder.ExportOutput(monitor.GetOutputPort("clearance"), f"cheat.{name}")
+    builder.ExportOutput(query_port, "cheat.query_object")
 
 
 def _AddDrives(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +43,8 @@ class CycleLog(FrozenValue):
         X_WG: (n, 4, 4) true nozzle poses in W.
         X_WG_desired: (n, 4, 4) nozzle poses of the desired joint state.
         clearance_time: (k,) s.
-        clearance: (k,) m, least distance of the robot from anything else.
+        clearance: (k,) m, least distance of the robot from the scene.
+        floor_clearance: (k,) m, the same from the floor and the robot's own frame.
         surface_map: The fused map.
         segmentation: The wall's segmentation, or None.
         program: The paint program, or None.
@@ -60,6 +62,7 @@ class CycleLog(FrozenValue):
     X_WG_desired: FloatArray
     clearance_time: FloatArray
     clearance: FloatArray
+    floor_clearance: FloatArray
     surface_map: SurfaceMap
     segmentation: WallSegmentation | None
     program: PaintProgram | None
@@ -92,6 +95,7 @@ def SimulateCycle(
             ("desired", "arm.desired_state", LOG_PERIOD),
             ("trigger", "gun.trigger", LOG_PERIOD),
             ("clearance", "cheat.clearance", CLEARANCE_PERIOD),
+            ("floor_clearance", "cheat.floor_clearance", CLEARANCE_PERIOD),
         )
     }
     simulator = Simulator(builder.Build())
@@ -112,7 +116,7 @@ def SimulateCycle(
     return _MakeLog(scenario, cycle, context, sinks, status, look_image)
 
 
-def _Evaluate(cycle: PaintCycleDiagram, context: Context, port: str) -> object:
+def _Evaluate(cycle: PaintCycleDiagram, context: Context, port: str) -> Any:
     own = cycle.diagram.GetMyContextFromRoot(context)
     return cycle.diagram.GetOutputPort(port).Eval(own)
 
@@ -145,6 +149,7 @@ def _MakeLog(
         X_WG_desired=_GunPoses(kinematics, data["desired"][:NQ].T),
         clearance_time=logs["clearance"].sample_times().copy(),
         clearance=data["clearance"][0].copy(),
+        floor_clearance=data["floor_clearance"][0].copy(),
         surface_map=_Evaluate(cycle, context, "surface_map"),
         segmentation=segmentation.value,
         program=program.value,

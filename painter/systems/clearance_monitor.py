@@ -1,12 +1,12 @@
 """How close the robot comes to anything else; simulation only."""
 
 from pydrake.common.value import Value
-from pydrake.geometry import GeometryId, QueryObject
+from pydrake.geometry import GeometryId, QueryObject, SignedDistancePair
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 
 class ClearanceMonitor(LeafSystem):
-    """Measures the least distance between the robot and everything else.
+    """Measures the least distance between the robot and what is round it.
 
     .. pydrake_system::
 
@@ -18,26 +18,34 @@ class ClearanceMonitor(LeafSystem):
 
     Ports:
         query_object: QueryObject of the scene graph.
-        clearance: (1,) m, from the robot to what is not the robot; negative =
-            penetration, also of the robot with itself; `horizon` = nothing is nearer.
+        clearance: (1,) m, from the robot to the surroundings; negative = penetration,
+            also of the robot with itself; `horizon` = nothing is nearer.
     """
 
-    def __init__(self, *, robot: frozenset[GeometryId], horizon: float = 0.3) -> None:
+    def __init__(
+        self,
+        *,
+        robot: frozenset[GeometryId],
+        surroundings: frozenset[GeometryId],
+        horizon: float = 0.3,
+    ) -> None:
         """Creates the monitor.
 
         Args:
             robot: Collision geometries of the robot's moving bodies.
+            surroundings: Those of what it is to keep away from.
             horizon: Distances beyond this are not looked at, m.
 
         Raises:
-            ValueError: The robot has no geometry or the horizon is not positive.
+            ValueError: There is no geometry or the horizon is not positive.
         """
         super().__init__()
-        if not robot:
-            raise ValueError("robot must name at least one geometry.")
+        if not robot or not surroundings:
+            raise ValueError("robot and surroundings must each name a geometry.")
         if not horizon > 0.0:
             raise ValueError(f"horizon must be > 0 m, got {horizon!r}.")
         self._robot = robot
+        self._surroundings = surroundings
         self._horizon = horizon
         # Inputs.
         self._query_port = self.DeclareAbstractInputPort(
@@ -49,11 +57,12 @@ class ClearanceMonitor(LeafSystem):
     def _CalcClearance(self, context: Context, output: BasicVector) -> None:
         query = self._query_port.Eval(context)
         pairs = query.ComputeSignedDistancePairwiseClosestPoints(self._horizon)
-        # Parts of the robot are near one another by design; they may not touch.
-        near = (
-            pair.distance
-            for pair in pairs
-            if (pair.id_A in self._robot) != (pair.id_B in self._robot)
-            or pair.distance < 0.0
-        )
+        near = (pair.distance for pair in pairs if self._Counts(pair))
         output.SetAtIndex(0, min(near, default=self._horizon))
+
+    def _Counts(self, pair: SignedDistancePair) -> bool:
+        ids = {pair.id_A, pair.id_B}
+        if ids <= self._robot:
+            # Parts of the robot are near one another by design; they may not touch.
+            return pair.distance < 0.0
+        return bool(ids & self._robot) and bool(ids & self._surroundings)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.common.value import Value
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
@@ -12,7 +13,6 @@ from painter.systems.paint_cycle import STAGES, PaintCycle
 from painter.systems.path_follower import PathFollower
 from painter.systems.stage import Stage
 from painter.systems.values import ArmStatus, DriveStatus, OperatorCommand, Phase
-from pydrake.math import RigidTransform
 
 DURATION = 1.0
 SPRAY = (0.3, 0.6)
@@ -101,7 +101,9 @@ class Rig:
         self.set("operator", OperatorCommand(self.words, word))
 
     def output(self, system, port: str):
-        return system.GetOutputPort(port).Eval(system.GetMyContextFromRoot(self.context))
+        return system.GetOutputPort(port).Eval(
+            system.GetMyContextFromRoot(self.context)
+        )
 
     @property
     def status(self):
@@ -109,7 +111,9 @@ class Rig:
 
     @property
     def phases(self) -> list[str]:
-        return [data["phase"] for _, name, data in self.status.events if name == "phase"]
+        return [
+            data["phase"] for _, name, data in self.status.events if name == "phase"
+        ]
 
     @property
     def trigger(self) -> float:
@@ -124,7 +128,7 @@ class Rig:
         self.advance_until(lambda: self.status.finished)
 
 
-ALL = "HOME LOOK SCAN SEGMENT PLAN REVIEW PAINT RETRACT DONE".split()
+ALL = [step.value for step in Phase][: list(Phase).index(Phase.DONE) + 1]
 
 
 def test_unattended_cycle_goes_through_all_phases():

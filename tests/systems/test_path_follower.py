@@ -123,9 +123,7 @@ def test_gun_stays_closed_when_the_command_says_so():
 def test_refuses_a_motion_that_begins_elsewhere():
     rig = Rig()
     motion = make_motion()
-    rig.command(
-        MotionCommand(number=1, motion=motion.replace(q=motion.q + 0.01))
-    )
+    rig.command(MotionCommand(number=1, motion=motion.replace(q=motion.q + 0.01)))
     with pytest.raises(MotionLimitError, match="0.01"):
         rig.advance(0.1)
 

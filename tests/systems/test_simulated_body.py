@@ -67,7 +67,7 @@ def test_gun_pose_of_the_stretched_arm():
     np.testing.assert_allclose(X_WG.rotation().col(2), [1.0, 0.0, 0.0], atol=1e-12)
 
 
-def make_sliding_box(robot_names: set[str]):
+def make_sliding_box(robot: set[str], surroundings: set[str]):
     """A 0.2 m box that slides along x towards a wall whose face is at x = 1."""
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.001)
@@ -82,13 +82,21 @@ def make_sliding_box(robot_names: set[str]):
         "wall": plant.RegisterCollisionGeometry(
             plant.world_body(), RigidTransform([1.5, 0, 0]), Box(1, 4, 4), "w", friction
         ),
+        "floor": plant.RegisterCollisionGeometry(
+            plant.world_body(), RigidTransform([0, 0, -9]), Box(9, 9, 1), "f", friction
+        ),
     }
     plant.AddJoint(
         PrismaticJoint("x", plant.world_frame(), body.body_frame(), [1, 0, 0])
     )
     plant.Finalize()
-    robot = frozenset(ids[name] for name in robot_names)
-    dut = builder.AddSystem(ClearanceMonitor(robot=robot, horizon=0.3))
+    dut = builder.AddSystem(
+        ClearanceMonitor(
+            robot=frozenset(ids[name] for name in robot),
+            surroundings=frozenset(ids[name] for name in surroundings),
+            horizon=0.3,
+        )
+    )
     builder.Connect(
         scene_graph.get_query_output_port(), dut.GetInputPort("query_object")
     )
@@ -103,14 +111,19 @@ def make_sliding_box(robot_names: set[str]):
     return clearance
 
 
-def test_clearance_is_the_distance_to_what_is_not_the_robot():
-    clearance = make_sliding_box({"slider"})
+def test_clearance_is_the_distance_to_the_surroundings():
+    clearance = make_sliding_box({"slider"}, {"wall"})
     assert clearance(0.75) == pytest.approx(0.15, abs=1e-6)
     assert clearance(0.95) == pytest.approx(-0.05, abs=1e-6)
     assert clearance(0.0) == 0.3  # Beyond the horizon.
 
 
+def test_what_is_neither_robot_nor_surroundings_does_not_count():
+    clearance = make_sliding_box({"slider"}, {"floor"})
+    assert clearance(0.75) == 0.3
+
+
 def test_parts_of_the_robot_count_only_when_they_touch():
-    clearance = make_sliding_box({"slider", "wall"})
+    clearance = make_sliding_box({"slider", "wall"}, {"floor"})
     assert clearance(0.75) == 0.3
     assert clearance(0.95) == pytest.approx(-0.05, abs=1e-6)
