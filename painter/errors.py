@@ -31,3 +31,7 @@ class MotionLimitError(PainterError):
 
 class FaultError(PainterError):
     """The cycle ended in FAULT; the message is the latched cause."""
+
+
+class BusError(PainterError):
+    """The robot's bus, or a device on it, does not do what it should."""

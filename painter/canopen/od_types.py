@@ -1,0 +1,101 @@
+"""CANopen's basic data types: to bytes and back, with their bounds.
+
+Source: CiA 301 v4.2.0, 7.1.6 (encoding) and table 44 (codes).
+"""
+
+import enum
+import struct
+
+
+class DataType(enum.IntEnum):
+    """Data types that drives and I/O nodes use in the objects touched here."""
+
+    BOOLEAN = 0x01
+    INTEGER8 = 0x02
+    INTEGER16 = 0x03
+    INTEGER32 = 0x04
+    UNSIGNED8 = 0x05
+    UNSIGNED16 = 0x06
+    UNSIGNED32 = 0x07
+    REAL32 = 0x08
+    VISIBLE_STRING = 0x09
+    OCTET_STRING = 0x0A
+    UNICODE_STRING = 0x0B
+    DOMAIN = 0x0F
+    REAL64 = 0x11
+    INTEGER64 = 0x15
+    UNSIGNED64 = 0x1B
+
+
+_FORMATS = {
+    DataType.BOOLEAN: "<?",
+    DataType.INTEGER8: "<b",
+    DataType.INTEGER16: "<h",
+    DataType.INTEGER32: "<i",
+    DataType.UNSIGNED8: "<B",
+    DataType.UNSIGNED16: "<H",
+    DataType.UNSIGNED32: "<I",
+    DataType.REAL32: "<f",
+    DataType.REAL64: "<d",
+    DataType.INTEGER64: "<q",
+    DataType.UNSIGNED64: "<Q",
+}
+
+Value = int | float | bytes
+
+
+def size_of(data_type: DataType) -> int | None:
+    """Returns the size in bytes; None for strings and domains, which vary."""
+    layout = _FORMATS.get(data_type)
+    return None if layout is None else struct.calcsize(layout)
+
+
+def bounds(data_type: DataType) -> tuple[int, int]:
+    """Returns the least and greatest value of an integer type.
+
+    Raises:
+        ValueError: It is not an integer type.
+    """
+    size = size_of(data_type)
+    if size is None or data_type in (DataType.REAL32, DataType.REAL64):
+        raise ValueError(f"{data_type.name} has no integer bounds.")
+    if data_type == DataType.BOOLEAN:
+        return 0, 1
+    bits = 8 * size
+    if data_type.name.startswith("INTEGER"):
+        return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
+    return 0, (1 << bits) - 1
+
+
+def pack(data_type: DataType, value: Value) -> bytes:
+    """Returns the value as CANopen sends it, little endian.
+
+    Raises:
+        ValueError: The value does not fit the type; names both.
+    """
+    layout = _FORMATS.get(data_type)
+    if layout is None:
+        if not isinstance(value, bytes):
+            raise ValueError(f"{data_type.name} takes bytes, got {value!r}.")
+        return value
+    try:
+        return struct.pack(layout, value)
+    except struct.error:
+        raise ValueError(f"{value!r} does not fit {data_type.name}.") from None
+
+
+def unpack(data_type: DataType, data: bytes) -> Value:
+    """Returns the value of bytes as CANopen sends them.
+
+    Raises:
+        ValueError: There are too few or too many bytes; names both lengths.
+    """
+    layout = _FORMATS.get(data_type)
+    if layout is None:
+        return data
+    if len(data) != struct.calcsize(layout):
+        raise ValueError(
+            f"{data_type.name} takes {struct.calcsize(layout)} bytes, got {len(data)}."
+        )
+    value: int | float = struct.unpack(layout, data)[0]
+    return int(value) if data_type == DataType.BOOLEAN else value

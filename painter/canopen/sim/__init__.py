@@ -1,0 +1,1 @@
+"""Simulated CANopen nodes that behave like real ones, down to their faults."""
