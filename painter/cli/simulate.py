@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from PIL import Image
 from pydrake.geometry import Meshcat
@@ -19,8 +20,10 @@ from painter.diagrams.simulation import (
     clearance_violations,
 )
 from painter.errors import FaultError
+from painter.planning.stroke_lines import nominal_pitch
 from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
 from painter.run.folder import LOOK, SCENE, RunFolder
+from painter.run.replay import add_paint, set_view
 from painter.run.report import finish_run
 from painter.run.values import Executed, Film, Truth
 from painter.scene.load import load_scene
@@ -30,6 +33,7 @@ from painter.systems.values import CycleStatus, FollowerStatus, Phase
 
 # How much nearer than planned the robot may come: tracking and the map's own error.
 CLEARANCE_TOLERANCE = 0.02
+REPLAY_RATE = 10.0  # Pictures a second of robot time.
 VERSIONS = ("painter", "drake", "numpy", "scipy", "open3d")
 
 
@@ -74,14 +78,20 @@ def simulate(
     viewer = Meshcat() if meshcat or replay else None
     if meshcat and viewer is not None:
         typer.echo(f"Meshcat: {viewer.web_url()}", err=True)
-    if replay and viewer is not None:
-        viewer.StartRecording(frames_per_second=10.0)
+    if viewer is not None:
+        set_view(viewer)
+        viewer.StartRecording(frames_per_second=REPLAY_RATE)
     versions = {name: importlib.metadata.version(name) for name in VERSIONS}
     folder.log(0.0, "started", versions=versions)
     with progress(f"Simulating {job.name}") as show:
         log = SimulateCycle(job, meshcat=viewer, watch=_watch(folder, show))
     write_log(folder, job, log)
     if replay and viewer is not None:
+        sprayed = np.flatnonzero(log.trigger)
+        if log.program is not None and sprayed.size:
+            began = log.time[sprayed[0]] - log.program.motion.spray_on[0, 0]
+            pitch = nominal_pitch(job.tile.width, tip=job.gun.tip, raster=job.raster)
+            add_paint(viewer, log.program, pitch=pitch, start=float(began))
         viewer.PublishRecording()
         folder.write_text(SCENE, viewer.StaticHtml())
     figures = finish_run(
