@@ -66,7 +66,7 @@ def row(mask: BoolArray, tip: TipConfig, lead: float) -> str:
     nominal = mean_film(tip, speed=raster.speed, pitch=pitch)
     wide = np.pad(mask, round(MARGIN / CELL))
     x, y = cell_centres(wide.shape, CELL, margin=MARGIN)
-    film = predicted_film(strokes, x, y, tip=tip, standoff=raster.standoff)
+    film = predicted_film(strokes, x, y, tip=tip)
     on = film[wide] / nominal
     lines = len({stroke.column for stroke in strokes})
     return (

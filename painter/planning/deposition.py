@@ -126,7 +126,6 @@ def predicted_film(
     y: FloatArray,
     *,
     tip: TipConfig,
-    standoff: float,
 ) -> FloatArray:
     """Returns the film that strokes along T y leave on a flat wall.
 
@@ -138,7 +137,6 @@ def predicted_film(
         x: (nx,) m, columns at which to give the film, ascending, in T.
         y: (ny,) m, rows, in T.
         tip: The spray tip.
-        standoff: Nozzle to wall, m.
 
     Returns:
         (ny, nx) wet film, m.
@@ -146,9 +144,9 @@ def predicted_film(
     Raises:
         ValueError: A stroke does not run along T y.
     """
-    a, b = half_axes(tip, standoff)
     film = np.zeros((y.size, x.size))
     for stroke in strokes:
+        a, b = half_axes(tip, stroke.standoff)
         x_line, y_line = _line(stroke)
         columns = slice(*np.searchsorted(x, [x_line - a, x_line + a]))
         offset = x[columns] - x_line
@@ -157,7 +155,9 @@ def predicted_film(
             _flow_passed((y[:, None] - y_end) / thickness, tip.beta2)
             for y_end in y_line
         ]
-        profile = stroke_profile(offset, tip=tip, standoff=standoff, speed=stroke.speed)
+        profile = stroke.flow * stroke_profile(
+            offset, tip=tip, standoff=stroke.standoff, speed=stroke.speed
+        )
         film[:, columns] += profile * (passed[0] - passed[1])
     return film
 

@@ -19,6 +19,10 @@ _LONGEST_BLEND = 8.0  # s
 _SAMPLES = 33  # Of a blend, where its rates are looked at.
 # The peak between two samples may exceed what is seen at them a little.
 SEARCH_SHARE = 0.98
+_DENSE_STEP = 0.004  # s, of the second look at a move that was found.
+_TORQUE_EVERY = 5  # Of these samples, one is looked at for torque.
+_SLOWER = 1.05  # By which a move is slowed that fails the second look,
+_SLOWER_STEPS = 30  # and how often.
 
 
 class Segment(Protocol):
@@ -67,13 +71,15 @@ def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
 
     Args:
         limits: Of the joints.
-        share: Of velocities and accelerations; positions keep 0.02 rad off their ends.
+        share: Of velocities, accelerations and torques; positions keep 0.02 rad off
+            their ends.
     """
     return limits.replace(
         q_min=limits.q_min + _POSITION_MARGIN,
         q_max=limits.q_max - _POSITION_MARGIN,
         v_max=share * limits.v_max,
         a_max=share * limits.a_max,
+        effort_max=share * limits.effort_max,
     )
 
 
@@ -92,6 +98,11 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointBlen
     by_velocity = np.abs(rate[0, 0]) / (SEARCH_SHARE * limits.v_max)
     by_acceleration = np.sqrt(np.abs(first[0]) / (SEARCH_SHARE * limits.a_max))
     duration = max(_SHORTEST_MOVE, float(np.max([by_velocity, by_acceleration])))
+    # What gravity alone takes cannot be saved by going slower.
+    for _ in range(_SLOWER_STEPS):
+        if keeps_limits(JointBlend(start, end, duration).q, duration, limits):
+            break
+        duration *= _SLOWER
     return JointBlend(start, end, duration)
 
 
@@ -118,33 +129,70 @@ def fastest_joint_blend(
         keeps &= (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
         return np.asarray(keeps & limits.contains(q).all(axis=1))
 
-    duration = shortest(allowed, np.geomspace(_SHORTEST_MOVE, _LONGEST_BLEND, 60))
+    def certain(duration: float) -> bool:
+        return keeps_limits(JointBlend(start, end, duration).q, duration, limits)
+
+    durations = np.geomspace(_SHORTEST_MOVE, _LONGEST_BLEND, 60)
+    duration = shortest(allowed, durations, certain)
     return None if duration is None else JointBlend(start, end, duration)
 
 
+def keeps_limits(
+    place: Callable[[FloatArray], FloatArray], duration: float, limits: ArmLimits
+) -> bool:
+    """Tells whether a move keeps rates and torques, looked at as densely as executed.
+
+    A search over many durations looks at few samples of each, between which a peak may
+    hide; what it finds is looked at once more.
+
+    Args:
+        place: Joint angles (n, 5), rad, at times (n,), s.
+        duration: Of the move, s.
+        limits: Of the joints, as far as the plan may use them.
+    """
+    count = max(9, int(np.ceil(duration / _DENSE_STEP)) + 1)
+    time, step = np.linspace(0.0, duration, count, retstep=True)
+    q = place(time)
+    v = (q[2:] - q[:-2]) / (2.0 * step)
+    a = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2
+    with np.errstate(invalid="ignore"):
+        if not ((np.abs(v) <= limits.v_max) & (np.abs(a) <= limits.a_max)).all():
+            return False
+    if limits.torques is None:
+        return True
+    few = slice(None, None, _TORQUE_EVERY)
+    torques = limits.torques(q[1:-1][few], v[few], a[few])
+    return bool((np.abs(torques) <= limits.effort_max).all())
+
+
 def shortest(
-    allowed: Callable[[FloatArray], BoolArray], durations: FloatArray
+    allowed: Callable[[FloatArray], BoolArray],
+    durations: FloatArray,
+    certain: Callable[[float], bool] = lambda duration: True,
 ) -> float | None:
     """Finds the shortest duration that is allowed.
 
     Allowed durations need not be an interval (a slower turn swings out farther), so
     a grid is tried, then the gap between the last one that fails and the first one
-    that does not.
+    that does not, then longer ones until one passes the second look.
 
     Args:
         allowed: Tells of durations (k,), s, which are allowed, (k,) bool.
         durations: (n,) s, ascending grid.
+        certain: A slower and closer look at one duration that is allowed.
     """
     good = allowed(durations)
     if not good.any():
         return None
     first = int(np.argmax(good))
-    if first > 0:
-        between = np.linspace(durations[first - 1], durations[first], 8)[1:-1]
-        finer = allowed(between)
-        if finer.any():
-            return float(between[int(np.argmax(finer))])
-    return float(durations[first])
+    before = durations[max(first - 1, 0)]
+    between = np.linspace(before, durations[first], 8)[1:-1]
+    longer = durations[first] * _SLOWER ** np.arange(1, _SLOWER_STEPS)
+    tries = np.unique(
+        np.concatenate([between, durations[good], longer[longer < durations[-1]]])
+    )
+    tries = tries[allowed(tries)]
+    return next((float(duration) for duration in tries if certain(duration)), None)
 
 
 def chain(
@@ -152,6 +200,7 @@ def chain(
     *,
     period: float,
     spray_on: FloatArray | None = None,
+    flow: FloatArray | None = None,
 ) -> Motion:
     """Samples segments one after the other and joins the samples twice smoothly.
 
@@ -164,6 +213,7 @@ def chain(
         segments: At least one; the first starts and the last ends at rest.
         period: Largest spacing of the samples, s.
         spray_on: (m, 2) s, see `Motion.spray_on`; None = the gun stays closed.
+        flow: (m,) see `Motion.flow`.
 
     Returns:
         The motion.
@@ -178,7 +228,7 @@ def chain(
     v = CubicSpline(time, q, bc_type="clamped")(time, 1)
     v[[0, -1]] = 0.0
     spray = np.zeros((0, 2)) if spray_on is None else spray_on
-    return Motion(time=time, q=q, v=v, spray_on=spray)
+    return Motion(time=time, q=q, v=v, spray_on=spray, flow=flow)
 
 
 def _sample_times(knots: FloatArray, period: float) -> FloatArray:

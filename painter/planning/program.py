@@ -80,17 +80,23 @@ def plan_program(
         np.asarray(segmentation.wall_mask), segmentation.cell, tip=tip, raster=raster
     )
     clear, skipped = _clear_strokes(wanted, linker, raster)
-    path, strokes, passes, unlinked = _link(clear, q0, linker, raster.standoff)
+    path, strokes, passes, unlinked = _link(clear, q0, linker)
     starts = start_times(path)[:-1]
     flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
     spray_on = np.reshape(flows, (-1, 2)) - tip.valve_delay
     program = PaintProgram(
         strokes=strokes,
-        motion=chain(path, period=motion.sample_period, spray_on=spray_on),
+        motion=chain(
+            path,
+            period=motion.sample_period,
+            spray_on=spray_on,
+            flow=np.array([stroke.flow for stroke in strokes]),
+        ),
         X_WT=segmentation.X_WT,
         standoff=raster.standoff,
         nominal_thickness=nominal_film(segmentation, tip=tip, raster=raster),
-        paint_volume=tip.flow * sum(stroke.length / stroke.speed for stroke in strokes),
+        paint_volume=tip.flow
+        * sum(stroke.flow * stroke.length / stroke.speed for stroke in strokes),
         skipped=(*skipped, *unlinked),
     )
     verify_motion(
@@ -124,7 +130,7 @@ def _clear_strokes(
         share = np.linspace(0.0, 1.0, count)
         p_TGs = _nozzle(
             stroke.start_T + np.outer(share, stroke.end_T - stroke.start_T),
-            raster.standoff,
+            stroke.standoff,
         )
         what = f"stroke {number + 1} on line {stroke.column + 1}"
         q = require_reach(p_TGs, gun=linker.gun, limits=linker.limits, what=what)
@@ -153,7 +159,7 @@ def _clear_strokes(
 
 
 def _link(
-    strokes: Sequence[Stroke], q0: FloatArray, linker: Linker, standoff: float
+    strokes: Sequence[Stroke], q0: FloatArray, linker: Linker
 ) -> tuple[list[Segment], tuple[Stroke, ...], list[int], list[SkippedStroke]]:
     """Joins strokes by moves, from rest at `q0` to rest at home.
 
@@ -167,11 +173,11 @@ def _link(
     skipped: list[SkippedStroke] = []
     last: Pass | None = None
     for wanted in strokes:
-        fit = _fit(wanted, last, q0, linker, standoff)
+        fit = _fit(wanted, last, q0, linker)
         skipped += fit.skipped
         if fit.stroke is None:
             continue
-        last = _pass(fit.stroke, standoff)
+        last = _pass(fit.stroke)
         path += [*fit.link, ToolMove(last, linker.gun)]
         passes.append(len(path) - 1)
         done.append(fit.stroke)
@@ -194,9 +200,7 @@ class _Fit:
     skipped: list[SkippedStroke]
 
 
-def _fit(
-    wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker, standoff: float
-) -> _Fit:
+def _fit(wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker) -> _Fit:
     """Joins a stroke to the last pass, or to rest at `q0`, trimming it if need be.
 
     In a corner of the tile, or close to the floor, there may be no room to turn at full
@@ -209,7 +213,7 @@ def _fit(
             return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
         stroke = _part(wanted, 0.0, 1.0 - trims[end])
         try:
-            linker.to_rest(_pass(stroke, standoff).end)  # There must be a way back.
+            linker.to_rest(_pass(stroke).end)  # There must be a way back.
             break
         except (CollisionError, ReachError) as error:
             first_failure = first_failure or str(error)
@@ -219,7 +223,7 @@ def _fit(
         if trims[begin] + trims[end] >= 1.0:
             break
         stroke = _part(wanted, trims[begin], 1.0 - trims[end])
-        start = _pass(stroke, standoff).start
+        start = _pass(stroke).start
         try:
             if last is None:
                 link = linker.from_rest(q0, start)
@@ -236,9 +240,9 @@ def _fit(
     return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
 
 
-def _pass(stroke: Stroke, standoff: float) -> Pass:
+def _pass(stroke: Stroke) -> Pass:
     """Returns the nozzle's pass over a stroke."""
-    start, end = _nozzle(np.stack([stroke.start_T, stroke.end_T]), standoff)
+    start, end = _nozzle(np.stack([stroke.start_T, stroke.end_T]), stroke.standoff)
     return Pass.between(start, end, stroke.speed)
 
 

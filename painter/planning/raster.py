@@ -77,6 +77,7 @@ def _strokes_on(
                 speed=raster.speed,
                 kind="body",
                 column=column,
+                standoff=raster.standoff,
             )
             for y_start, y_end in spans
         ]

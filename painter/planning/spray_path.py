@@ -19,8 +19,10 @@ class Stroke(FrozenValue):
             opens.
         end_T: (2,) m: where it closes.
         speed: Speed of that point along the wall, m/s.
-        kind: "body" for the raster; later "cut_in", "touch_up".
-        column: Number of the raster line it lies on, from the left.
+        kind: "body" for the raster, "cut_in" beside an edge; later "touch_up".
+        column: Number of the line it lies on, from the left.
+        standoff: Nozzle to wall, m; nearer, the fan is narrower.
+        flow: Share of the tip's nominal flow, above 0 up to 1.
     """
 
     start_T: FloatArray
@@ -28,6 +30,8 @@ class Stroke(FrozenValue):
     speed: float
     kind: str
     column: int
+    standoff: float = 0.30
+    flow: float = 1.0
 
     @property
     def length(self) -> float:
@@ -45,12 +49,14 @@ class Motion(FrozenValue):
         v: (n, 5) rad/s, zero in the first and last row.
         spray_on: (m, 2) s, [open, close) in the motion's own time as the trigger is
             commanded (valve delay already taken off), in order, not overlapping.
+        flow: (m,) share of the nominal flow while it is open; None = 1 throughout.
     """
 
     time: FloatArray
     q: FloatArray
     v: FloatArray
     spray_on: FloatArray
+    flow: FloatArray | None = None
 
     @property
     def duration(self) -> float:
@@ -63,9 +69,11 @@ class Motion(FrozenValue):
         return PiecewisePolynomial.CubicHermite(self.time, self.q.T, self.v.T)
 
     def trigger(self, time: float) -> float:
-        """Returns 1.0 while the gun is commanded open at `time` (s), else 0.0."""
+        """Returns the flow commanded at `time` (s), 0 to 1 of the nominal flow."""
         index = int(np.searchsorted(self.spray_on[:, 0], time, side="right")) - 1
-        return float(index >= 0 and time < self.spray_on[index, 1])
+        if index < 0 or time >= self.spray_on[index, 1]:
+            return 0.0
+        return 1.0 if self.flow is None else float(self.flow[index])
 
     def sprays_within(self, start: float, end: float) -> bool:
         """Returns whether the gun is to be open at any time in [start, end] (s)."""
@@ -94,7 +102,7 @@ class PaintProgram(FrozenValue):
         strokes: In order of execution.
         motion: Approach, strokes, turns and transits as one motion.
         X_WT: Tile frame T in W, as segmented.
-        standoff: Nozzle to wall, m.
+        standoff: Nozzle to wall on the raster's strokes, m; each stroke has its own.
         nominal_thickness: Film that the raster aims at, m (wet).
         paint_volume: Paint that leaves the gun, m³.
         skipped: Strokes, or parts of them, that the arm cannot do.

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 
 from painter.errors import InputError
 from painter.planning.spray_path import Motion, PaintProgram, SkippedStroke, Stroke
+from perception.values import FloatArray
 
 PROGRAM_FILE = "program.json"
 TRAJECTORY_FILE = "trajectory.npz"
@@ -85,7 +86,11 @@ def load_program(folder: Path) -> PaintProgram:
             SkippedStroke(_stroke(item), str(item["reason"]))
             for item in document["skipped"]
         )
-        motion = _load_motion(folder / TRAJECTORY_FILE, np.reshape(spray_on, (-1, 2)))
+        motion = _load_motion(
+            folder / TRAJECTORY_FILE,
+            np.reshape(spray_on, (-1, 2)),
+            np.array([stroke.flow for stroke in strokes]),
+        )
         return PaintProgram(
             strokes=strokes,
             motion=motion,
@@ -103,7 +108,7 @@ def load_program(folder: Path) -> PaintProgram:
         raise InputError(f"{path}: is not a paint program ({error}).") from error
 
 
-def _load_motion(path: Path, spray_on: np.ndarray) -> Motion:
+def _load_motion(path: Path, spray_on: FloatArray, flow: FloatArray) -> Motion:
     try:
         with np.load(path, allow_pickle=False) as file:
             return Motion(
@@ -111,6 +116,7 @@ def _load_motion(path: Path, spray_on: np.ndarray) -> Motion:
                 q=file["q"],
                 v=file["v"],
                 spray_on=np.asarray(spray_on, dtype=float),
+                flow=flow,
             )
     except KeyError as error:
         raise InputError(f"{path}: {error.args[0]}") from error
@@ -125,6 +131,8 @@ def _stroke_fields(stroke: Stroke) -> dict[str, Any]:
         "speed": stroke.speed,
         "kind": stroke.kind,
         "column": stroke.column,
+        "standoff": stroke.standoff,
+        "flow": stroke.flow,
     }
 
 
@@ -135,4 +143,6 @@ def _stroke(fields: dict[str, Any]) -> Stroke:
         speed=float(fields["speed"]),
         kind=str(fields["kind"]),
         column=int(fields["column"]),
+        standoff=float(fields["standoff"]),
+        flow=float(fields["flow"]),
     )

@@ -7,7 +7,7 @@ from painter.errors import MotionLimitError
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.obstacles import ClearSpace
 from painter.planning.spray_path import Motion, PaintProgram
-from perception.values import FloatArray
+from perception.values import FloatArray, IntArray
 
 _STEP = 0.002  # s, of the resampled motion.
 _SPEED_TOLERANCE = 0.02  # Share of the stroke's speed.
@@ -17,6 +17,10 @@ _ANGLE_TOLERANCE_DEG = 0.5  # Spray axis from the wall's normal.
 _POSITION_TOLERANCE = 1e-3  # rad; a measured start may lie a hair outside.
 _RATE_TOLERANCE = 1.02  # Share of the planned limits.
 _CLEARANCE_TOLERANCE = 0.001  # m
+_TORQUE_STEP = 0.02  # s, of the samples looked at for torque.
+# Root sum of squares over the joints, rad, between two looks at the clearance: the
+# nozzle moves at most 1.8 m x this.
+_CLEARANCE_STEP = 0.02
 _JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
 
@@ -28,18 +32,19 @@ def verify_motion(
     space: ClearSpace,
     what: str,
 ) -> None:
-    """Checks joint limits and clearance all along a motion.
+    """Checks joint limits, torques and clearance all along a motion.
 
     Args:
         motion: As it will be executed.
         limits: Of the joints.
-        limit_share: Share of their velocities and accelerations that plans may use.
+        limit_share: Share of their velocities, accelerations and torques that plans
+            may use.
         space: What must be kept clear of.
         what: Name of the motion, for messages.
 
     Raises:
-        MotionLimitError: A joint leaves its position, velocity or acceleration limit;
-            names joint, time, value and bound.
+        MotionLimitError: A joint leaves its position, velocity, acceleration or torque
+            limit; names joint, time, value and bound.
         CollisionError: The arm comes nearer than its clearance; names bodies and time.
     """
     time = _dense(0.0, motion.duration)
@@ -61,8 +66,20 @@ def verify_motion(
         ),
     ):
         _require_within(f"{what}: {name}", unit, time, values, bounds)
+    if limits.torques is not None:
+        time = np.arange(0.0, motion.duration, _TORQUE_STEP)
+        torques = limits.torques(
+            position.vector_values(time).T,
+            velocity.vector_values(time).T,
+            acceleration.vector_values(time).T,
+        )
+        bounds = share * limits.effort_max
+        _require_within(f"{what}: torque", "N m", time, torques, bounds)
     # Plans look at other samples than these.
-    space.require(motion.q, motion.time, what=what, slack=_CLEARANCE_TOLERANCE)
+    seen = _spread(motion.q)
+    space.require(
+        motion.q[seen], motion.time[seen], what=what, slack=_CLEARANCE_TOLERANCE
+    )
 
 
 def verify_strokes(
@@ -105,7 +122,7 @@ def verify_strokes(
             (
                 "stand-off error",
                 "m",
-                p_TGs[:, 2] - program.standoff,
+                p_TGs[:, 2] - stroke.standoff,
                 _STANDOFF_TOLERANCE,
             ),
             ("gun angle", "deg", off_axis_deg, _ANGLE_TOLERANCE_DEG),
@@ -125,6 +142,13 @@ def _gun_in_tile(
     p_TGs = (X_TW @ p_WGs.T).T
     axes_T = (X_TW.rotation().matrix() @ R_WGs[:, :, 2].T).T
     return p_TGs, axes_T
+
+
+def _spread(q: FloatArray) -> IntArray:
+    """Returns the rows of q (n, 5) that are looked at, ends among them."""
+    travel = np.cumsum(np.linalg.norm(np.diff(q, axis=0), axis=1))
+    _, first = np.unique(np.floor(travel / _CLEARANCE_STEP), return_index=True)
+    return np.unique(np.concatenate([[0], first + 1, [len(q) - 1]]))
 
 
 def _dense(start: float, end: float) -> FloatArray:

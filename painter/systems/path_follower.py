@@ -101,8 +101,8 @@ class PathFollower(LeafSystem):
         motion_command: MotionCommand.
         state: (10,) measured q, v; rad, rad/s. Read once, at the start, to hold there.
         desired_state: (10,) q, v; rad, rad/s.
-        trigger: (1,) 1 = gun open. Open only at the planned speed: the film would be
-            thicker anywhere else.
+        trigger: (1,) 0 to 1 of the nominal flow. Open only at the planned speed: the
+            film would be thicker anywhere else.
         status: FollowerStatus.
 
     A motion that was stopped while its gun was to be open is resumed as a machine tool

@@ -122,7 +122,7 @@ def test_predicted_film_is_the_rate_integrated_along_the_stroke():
     """At points before, at, near and after the ends of the stroke."""
     x = np.array([0.46, 0.5, 0.57])
     y = np.array([0.28, 0.30, 0.31, 0.5, 0.695, 0.71, 0.75])
-    film = predicted_film([stroke(0.5, 0.30, 0.70)], x, y, tip=TIP, standoff=STANDOFF)
+    film = predicted_film([stroke(0.5, 0.30, 0.70)], x, y, tip=TIP)
     for i, yi in enumerate(y):
         for j, xj in enumerate(x):
             end = B * np.sqrt(1.0 - ((xj - 0.5) / A) ** 2)
@@ -139,7 +139,7 @@ def test_predicted_film_holds_all_that_lands():
     cell = 0.002
     x = y = np.arange(0.0, 1.0, cell) + cell / 2
     strokes = [stroke(0.5, 0.2, 0.8), stroke(0.4, 0.7, 0.3)]
-    film = predicted_film(strokes, x, y, tip=TIP, standoff=STANDOFF)
+    film = predicted_film(strokes, x, y, tip=TIP)
     sprayed = TIP.flow * TIP.transfer_efficiency * (0.6 + 0.4) / SPEED
     # Midpoints on 2 mm of a fan 250 mm wide.
     assert film.sum() * cell**2 == pytest.approx(sprayed, rel=1e-4)
@@ -148,7 +148,7 @@ def test_predicted_film_holds_all_that_lands():
 def test_predicted_film_does_not_mind_the_direction():
     x = y = np.linspace(0.0, 1.0, 60)
     up, down = (
-        predicted_film([s], x, y, tip=TIP, standoff=STANDOFF)
+        predicted_film([s], x, y, tip=TIP)
         for s in (stroke(0.5, 0.2, 0.8), stroke(0.5, 0.8, 0.2))
     )
     np.testing.assert_array_equal(up, down)
@@ -164,4 +164,4 @@ def test_strokes_along_the_fan_are_refused():
     )
     x = y = np.linspace(0.0, 1.0, 10)
     with pytest.raises(ValueError, match="run along T y"):
-        predicted_film([across], x, y, tip=TIP, standoff=STANDOFF)
+        predicted_film([across], x, y, tip=TIP)

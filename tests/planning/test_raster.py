@@ -48,7 +48,7 @@ def pair(mask, strokes, setting):
     border = round(margin / CELL)
     mask = np.pad(mask, border)
     x, y = cell_centres(mask.shape, CELL, margin=margin)
-    film = predicted_film(strokes, x, y, tip=TIP, standoff=setting.standoff)
+    film = predicted_film(strokes, x, y, tip=TIP)
     width = (mask.shape[1] - 2 * border) * CELL
     pitch = nominal_pitch(width, tip=TIP, raster=setting)
     nominal = mean_film(TIP, speed=setting.speed, pitch=pitch)
