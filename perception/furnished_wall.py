@@ -178,4 +178,5 @@ def _box(
 ) -> BoolArray:
     """Returns which places are in an upright rectangle about a shifted middle."""
     across: BoolArray = np.abs(x - middle_x - shift[0]) <= width / 2
-    return across & (np.abs(y - middle_y - shift[1]) <= height / 2)
+    across &= np.abs(y - middle_y - shift[1]) <= height / 2
+    return across

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from perception.filters import morton_codes, statistical_filter
+from perception.furnished_wall import furnished_wall
+
+K, ALPHA = 50, 3.5  # As in the paper.
 
 
 def brute_force(points: np.ndarray, k: int, alpha: float) -> np.ndarray:
@@ -90,3 +93,106 @@ def test_morton_code_interleaves_bits():
     np.testing.assert_array_equal(
         morton_codes(points), np.array([0, 2**63 - 1, 1, 2, 4, 8], dtype=np.uint64)
     )
+
+
+def golden_figures(points: np.ndarray) -> np.ndarray:
+    """Mean distance to the 50 nearest others by brute force, over (N, 3) points.
+
+    Distances are taken to all points of the 27 cells around a point's cell of edge R:
+    where the 50th is at most R, no point beyond can be nearer. For points where it is
+    not, R grows, and in the end all points count.
+    """
+    figures = np.full(len(points), np.nan)
+    everything = np.arange(len(points))
+    spacing = np.sqrt(np.prod(np.ptp(points[:, :2], axis=0)) / len(points))
+    for edge in (5 * spacing, 15 * spacing):
+        cells = np.floor(points / edge).astype(int)
+        _, cell_of = np.unique(cells, axis=0, return_inverse=True)
+        members = np.split(
+            np.argsort(cell_of, kind="stable"), np.cumsum(np.bincount(cell_of))[:-1]
+        )
+        table = {tuple(cells[own[0]]): own for own in members}
+        around = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3)).reshape(3, -1).T
+        for cell, own in table.items():
+            own = own[np.isnan(figures[own])]
+            near = [table.get(tuple(cell + step)) for step in around]
+            others = np.concatenate([some for some in near if some is not None])
+            if own.size and others.size > K:
+                mean, last = nearest_mean(points, own, others)
+                figures[own[last <= edge]] = mean[last <= edge]
+    for some in np.array_split(
+        np.flatnonzero(np.isnan(figures)), 4 + len(points) // 1000
+    ):
+        if some.size:
+            figures[some] = nearest_mean(points, some, everything)[0]
+    return figures
+
+
+def nearest_mean(points, own, others):
+    """Mean and largest of the 50 least distances from `own` to `others`."""
+    squares = sum(
+        (points[own, axis][:, None] - points[others, axis]) ** 2 for axis in range(3)
+    )
+    squares[own[:, None] == others] = np.inf
+    nearest = np.sqrt(np.partition(squares, K - 1, axis=1)[:, :K])
+    return nearest.mean(axis=1), nearest.max(axis=1)
+
+
+def golden(points: np.ndarray) -> np.ndarray:
+    figures = golden_figures(points.T)
+    return figures <= figures.mean() + ALPHA * figures.std(ddof=1)
+
+
+def filtered(points, **options):
+    return statistical_filter(points, neighbors=K, std_multiplier=ALPHA, **options)
+
+
+def test_brute_force_on_cells_is_the_definition():
+    points = furnished_wall(2_000, seed=5).p_CQs
+    np.testing.assert_array_equal(golden(points), brute_force(points, K, ALPHA))
+
+
+def test_large_clouds_are_filtered_by_the_definition():
+    points = furnished_wall(40_000, seed=2).p_CQs
+    keep = golden(points)
+    np.testing.assert_array_equal(filtered(points), keep)
+    assert 100 < np.count_nonzero(~keep) < 2000
+    # 10 of a million.
+    assert np.count_nonzero(filtered(points, fast=True) != keep) <= 1
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("count", [100_000, 500_000, 1_000_000])
+def test_walls_are_filtered_by_the_definition(count):
+    points = furnished_wall(count, seed=1).p_CQs
+    keep = golden(points)
+    np.testing.assert_array_equal(filtered(points), keep)
+    assert np.count_nonzero(filtered(points, fast=True) != keep) <= 10
+
+
+def test_fast_filter_holds_without_outliers():
+    # The threshold is close above most figures: nearly all points must be queried.
+    rng = np.random.default_rng(0)
+    points = rng.uniform(0.0, [[1.0], [1.0], [0.01]], (3, 30_000))
+    exact = filtered(points)
+    assert np.count_nonzero(filtered(points, fast=True) != exact) <= 1
+
+
+def test_twins_in_a_large_cloud_stay():
+    # The points of a clump have figure 0, which is no outlier, and count in the mean.
+    wall = furnished_wall(25_000, seed=3).p_CQs
+    points = np.concatenate([wall, np.full((3, 200), 0.7)], axis=1)
+    keep = golden(points)
+    assert keep[25_000:].all()
+    np.testing.assert_array_equal(filtered(points), keep)
+    assert np.count_nonzero(filtered(points, fast=True) != keep) <= 1
+
+
+@pytest.mark.parametrize("fast", [False, True])
+def test_large_lattice_has_no_outliers(fast):
+    # All figures are the same: the 8 nearest of each of 25 600 twins are twins.
+    corner = np.stack(np.meshgrid(*[np.arange(2.0)] * 3)).reshape(3, -1)
+    points = np.repeat(corner, 3200, axis=1)
+    keep = statistical_filter(points, neighbors=8, std_multiplier=3.5, fast=fast)
+    assert keep.all()
