@@ -9,10 +9,12 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces
 from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.resources import models_path
+from perception.values import FloatArray
 
 JOINT_NAMES = (
     "base_yaw",
@@ -97,6 +99,29 @@ def GetArmKinematics(plant: MultibodyPlant) -> ArmKinematics:
     )
 
 
+class ArmTorques:
+    """What a motion takes of the joints: inverse dynamics of a plant.
+
+    Gravity, inertia with that of the rotors, and the joints' viscous friction.
+    """
+
+    def __init__(self, plant: MultibodyPlant) -> None:
+        """Keeps a plant, finalised, in which the arm alone moves."""
+        self._plant = plant
+        self._context = plant.CreateDefaultContext()
+        self._forces = MultibodyForces(plant)
+
+    def __call__(self, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
+        """See `painter.planning.kinematics.TorqueModel`."""
+        plant, context, forces = self._plant, self._context, self._forces
+        torques = np.empty(q.shape)
+        for row, x in enumerate(np.hstack([q, v])):
+            plant.SetPositionsAndVelocities(context, x)
+            plant.CalcForceElementsContribution(context, forces)
+            torques[row] = plant.CalcInverseDynamics(context, a[row], forces)
+        return torques
+
+
 def GetArmLimits(plant: MultibodyPlant) -> ArmLimits:
     """Reads the limits of the five joints from the plant."""
     arm = plant.GetModelInstanceByName("arm")
@@ -108,6 +133,7 @@ def GetArmLimits(plant: MultibodyPlant) -> ArmLimits:
         v_max=np.array([joint.velocity_upper_limits()[0] for joint in joints]),
         a_max=np.array([joint.acceleration_upper_limits()[0] for joint in joints]),
         effort_max=np.array([drive.effort_limit() for drive in drives]),
+        torques=ArmTorques(plant) if plant.num_velocities() == len(joints) else None,
     )
 
 

@@ -94,7 +94,12 @@ def MakeBrain(scenario: Scenario) -> Diagram:
         "motion": scenario.motion,
         "period": period,
     }
-    mover = add("motion_planner", MotionPlanner(scan=scenario.scan, **planning))
+    mover = add(
+        "motion_planner",
+        MotionPlanner(
+            scan=scenario.scan, standoff=scenario.raster.standoff, **planning
+        ),
+    )
     planner = add(
         "spray_path_planner",
         SprayPathPlanner(tip=scenario.gun.tip, raster=scenario.raster, **planning),

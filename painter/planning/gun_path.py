@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from painter.planning.blend import KNOTS, MovingState, evaluate
-from painter.planning.joint_motion import SEARCH_SHARE, shortest
+from painter.planning.joint_motion import SEARCH_SHARE, keeps_limits, shortest
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from perception.values import BoolArray, FloatArray, FrozenValue
 
@@ -229,7 +229,12 @@ def fastest_tool_blend(
     if speed > 0.0 and travel > 0.0:
         # Going straight on at constant speed needs no acceleration of the gun at all.
         durations = np.sort(np.append(durations, travel / speed))
-    duration = shortest(allowed, durations)
+
+    def certain(duration: float) -> bool:
+        blend = ToolBlend(start, end, duration, hop, rise)
+        return keeps_limits(ToolMove(blend, gun).q, duration, limits)
+
+    duration = shortest(allowed, durations, certain)
     return None if duration is None else ToolBlend(start, end, duration, hop, rise)
 
 

@@ -7,6 +7,7 @@ the camera C look along L x. A pose is asked for by a point and that axis: the r
 about it cannot be chosen, the arm has five joints.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,11 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 
 # How far X_LG and X_LC may be from the form that the closed-form inverse needs.
 _MOUNT_TOLERANCE = 1e-9
+
+
+# Joint torques (n, 5), N m, that positions, velocities and accelerations (n, 5) each,
+# rad and s, take.
+TorqueModel = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +34,7 @@ class ArmLimits(FrozenValue):
         v_max: (5,) rad/s.
         a_max: (5,) rad/s².
         effort_max: (5,) N m at the joint.
+        torques: What a motion takes of them; None = not looked at.
     """
 
     q_min: FloatArray
@@ -35,6 +42,7 @@ class ArmLimits(FrozenValue):
     v_max: FloatArray
     a_max: FloatArray
     effort_max: FloatArray
+    torques: TorqueModel | None = None
 
     def contains(self, q: FloatArray) -> BoolArray:
         """Tells which rows of `q` (n, 5), rad, are finite and within the limits."""

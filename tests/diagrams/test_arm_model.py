@@ -87,3 +87,23 @@ def test_the_robot_sees_itself_and_its_frame(checker):
     into_frame = np.array([np.pi, 0.9, 1.2, -0.5, 0.0])
     for q in (folded, into_frame):
         assert not checker.CheckConfigCollisionFree(q)
+
+
+def test_torques_are_those_of_the_equation_of_motion(plant):
+    limits = GetArmLimits(plant)
+    rng = np.random.default_rng(1)
+    q = rng.uniform(limits.q_min, limits.q_max, (20, 5))
+    v, a = rng.uniform(-1.0, 1.0, (2, 20, 5))
+    torques = limits.torques(q, v, a)
+    damping = [plant.GetJointByName(name).default_damping() for name in JOINT_NAMES]
+    context = plant.CreateDefaultContext()
+    for row in range(len(q)):
+        plant.SetPositions(context, q[row])
+        plant.SetVelocities(context, v[row])
+        expected = (
+            plant.CalcMassMatrix(context) @ a[row]
+            + plant.CalcBiasTerm(context)
+            - plant.CalcGravityGeneralizedForces(context)
+            + damping * v[row]
+        )
+        np.testing.assert_allclose(torques[row], expected, atol=1e-9)

@@ -91,3 +91,20 @@ def test_hop_leaves_and_meets_the_passes_smoothly(robot, gun):
     speed = np.gradient(z, time)
     assert np.abs(speed[[1, -2]]).max() < 1e-3
     assert np.abs(np.gradient(speed, time)[[2, -3]]).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "gap", "hop", "rise"),
+    [(1.68, 0.31, 0.38, 0.05, 0.15), (1.70, 1.43, 0.17, 0.05, 0.15)],
+)
+def test_peaks_between_the_samples_of_the_search_are_seen(robot, x, y, gap, hop, rise):
+    limits = planning_limits(robot.limits, 0.9)
+    linker = robot.linker()
+    start, end = (MovingState.steady([x, y + d, 0.3], UP) for d in (0.0, gap))
+    blend = fastest_tool_blend(
+        start, end, gun=linker.gun, limits=limits, hop=hop, rise=rise
+    )
+    time, step = np.linspace(0.0, blend.duration, 2001, retstep=True)
+    q = ToolMove(blend, linker.gun).q(time)
+    peak = np.abs(np.diff(q, 2, axis=0)).max(axis=0) / step**2
+    assert (peak <= 1.005 * limits.a_max).all()  # 1.09 before it was looked at twice.

@@ -1,0 +1,63 @@
+"""All named scenes and twenty random ones are planned, from their truth."""
+
+import numpy as np
+import pytest
+
+from painter.config import load_scenario
+from painter.diagrams.arm_model import (
+    GetArmKinematics,
+    GetArmLimits,
+    MakeArmPlant,
+    MakeCollisionChecker,
+)
+from painter.diagrams.true_wall import true_segmentation
+from painter.planning.program import plan_program
+from painter.planning.tile import nominal_tile_pose
+from painter.planning.transfer import plan_transfer
+
+NAMED = [(name, 1) for name in ("blank", "cubes", "obstacles", "room", "terrace")]
+RANDOM = [("random", seed) for seed in range(1, 21)]
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def robot():
+    job = load_scenario("blank")
+    plant = MakeArmPlant(job.directives)
+    return {
+        "kinematics": GetArmKinematics(plant),
+        "limits": GetArmLimits(plant),
+        "checker": MakeCollisionChecker(
+            job.directives, clearance=job.motion.clearance
+        ),
+    }
+
+
+@pytest.mark.parametrize(("name", "seed"), NAMED + RANDOM)
+def test_program_is_whole_and_passes_its_verification(robot, name, seed):
+    job = load_scenario(name, [f"random_seed={seed}"])
+    wall = true_segmentation(job)
+    # A map's edges are off by a cell and its heights by millimetres.
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(0.0, 0.002, wall.depth.shape).astype(np.float32)
+    wall = wall.replace(depth=np.asarray(wall.depth) + noise)
+    q = np.deg2rad(job.motion.home_deg)
+    for goal, X_WT in (("look", nominal_tile_pose(job.tile)), ("scan", wall.X_WT)):
+        move = plan_transfer(
+            goal,
+            q,
+            X_WT=X_WT,
+            standoff=job.raster.standoff,
+            tile=job.tile,
+            scan=job.scan,
+            motion=job.motion,
+            **robot,
+        )
+        q = move.q[-1]
+    # Raises if a limit, a clearance, a stand-off or an angle is not kept.
+    program = plan_program(
+        wall, q, tip=job.gun.tip, raster=job.raster, motion=job.motion, **robot
+    )
+    left_out = sum(item.stroke.length for item in program.skipped)
+    assert left_out < 0.05 * sum(stroke.length for stroke in program.strokes)
