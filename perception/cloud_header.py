@@ -1,19 +1,36 @@
-"""Headers of PLY and PCD files, and whether the data they promise are there."""
+"""Headers of PLY and PCD files: which numbers the data hold, and where."""
 
+import re
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
-from perception.errors import CloudReadError
+import numpy as np
 
+MAX_POINTS = 50_000_000  # 1.2 GB as float64; a wall at 1 mm has 4 million.
 _MAX_HEADER = 65536
+_MAX_POINT_BYTES = 4096
 # Source: Turk, "The PLY polygon file format", 1994, and the names with bit sizes that
 # newer writers use.
-_PLY_SIZES = {
-    **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
-    **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
-    **dict.fromkeys(("int", "uint", "int32", "uint32", "float", "float32"), 4),
-    **dict.fromkeys(("double", "float64", "int64", "uint64"), 8),
+_PLY_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+    "int64": "i8",
+    "uint64": "u8",
 }
+_PLY_FORMS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
+# Source: Point Cloud Library, "The PCD file format", version 0.7.
+_PCD_TYPES = {
+    **{("I", size): f"<i{size}" for size in (1, 2, 4, 8)},
+    **{("U", size): f"<u{size}" for size in (1, 2, 4, 8)},
+    **{("F", size): f"<f{size}" for size in (4, 8)},
+}
+_PCD_FORMS = ("ascii", "binary", "binary_compressed")
 
 
 @dataclass(frozen=True)
@@ -22,71 +39,34 @@ class CloudHeader:
 
     Attributes:
         count: Points.
-        stride: Bytes of a point; 0 = text, a line a point.
-        compressed: The data begin with their compressed size (PCD).
+        point: NumPy type of one point, with a field for each of the file's; fields may
+            hold several numbers.
+        form: "ascii", "binary" or "binary_compressed" (field after field, by LZF).
         size: Bytes of the header itself.
+        viewpoint: Where the sensor was, in the cloud's frame and unit, if it says so.
     """
 
     count: int
-    stride: int
-    compressed: bool
+    point: "np.dtype[Any]"
+    form: str
     size: int
+    viewpoint: tuple[float, float, float] | None = None
 
 
-def read_header(path: Path) -> CloudHeader:
-    """Reads the header of a PLY or PCD file and checks the file's length against it.
+def parse_ply(data: bytes) -> CloudHeader:
+    """Reads the header of a PLY file.
 
     Args:
-        path: The file; its suffix tells which.
+        data: The file.
 
     Returns:
-        The header.
+        The header; what follows the vertices is not looked at.
 
     Raises:
-        CloudReadError: The header is damaged, has no x, y and z, or promises more than
-            the file holds; names the file and the numbers.
+        ValueError: The header is damaged or not of points with x, y and z; also
+            KeyError and IndexError, with what was looked for.
     """
-    data = path.read_bytes()
-    try:
-        parse = _parse_ply if path.suffix.lower() == ".ply" else _parse_pcd
-        header = parse(data)
-    except (KeyError, ValueError, IndexError) as error:
-        raise CloudReadError(f"{path}: damaged header: {error}.") from error
-    body = data[header.size :]
-    if header.compressed:
-        promised = 8 + int.from_bytes(body[:4], "little")
-    elif header.stride:
-        promised = header.count * header.stride
-    else:
-        lines = sum(1 for line in body.splitlines() if line.strip())
-        if lines < header.count:
-            raise CloudReadError(
-                f"{path}: truncated: the header promises {header.count} points, the "
-                f"file has {lines} lines of data."
-            )
-        return header
-    if len(body) < promised:
-        raise CloudReadError(
-            f"{path}: truncated: the header promises {header.count} points in "
-            f"{promised} bytes, the file has {len(body)}."
-        )
-    return header
-
-
-def _header_lines(data: bytes, last: str) -> tuple[list[list[str]], int]:
-    """Returns the words of the header's lines up to one that begins with `last`."""
-    lines, position = [], 0
-    while (end := data.find(b"\n", position, _MAX_HEADER)) >= 0:
-        words = data[position:end].decode("ascii").split()
-        position = end + 1
-        lines.append(words)
-        if words and words[0] == last:
-            return lines, position
-    raise ValueError(f"there is no line {last!r}")
-
-
-def _parse_ply(data: bytes) -> CloudHeader:
-    if not data.startswith(b"ply"):
+    if not re.match(rb"ply\s", data):
         raise ValueError("a PLY file begins with 'ply'")
     lines, size = _header_lines(data, "end_header")
     form = ""
@@ -95,39 +75,94 @@ def _parse_ply(data: bytes) -> CloudHeader:
         if words[:1] == ["format"]:
             form = words[1]
         elif words[:1] == ["element"]:
-            elements.append((words[1], int(words[2]), []))
+            elements.append((words[1], _count(words[2]), []))
         elif words[:1] == ["property"]:
             elements[-1][2].append(words[1:])
     if not elements or elements[0][0] != "vertex":
         raise ValueError("the first element is not 'vertex'")
+    if form not in _PLY_FORMS:
+        raise ValueError(f"format {form!r} is unknown")
     _, count, properties = elements[0]
-    _check_names(names=[words[-1] for words in properties])
     if any(words[0] == "list" for words in properties):
         raise ValueError("a vertex has a list property")
-    stride = 0
-    if form != "ascii":
-        stride = sum(_PLY_SIZES[words[0]] for words in properties)
-    return CloudHeader(count, stride, False, size)
+    names = [words[1] for words in properties]
+    types = [_PLY_FORMS[form] + _PLY_TYPES[words[0]] for words in properties]
+    point = _point_type(names, types, [1] * len(names))
+    return CloudHeader(count, point, "ascii" if form == "ascii" else "binary", size)
 
 
-def _parse_pcd(data: bytes) -> CloudHeader:
-    # Source: Point Cloud Library, "The PCD file format", version 0.7.
+def parse_pcd(data: bytes) -> CloudHeader:
+    """Reads the header of a PCD file.
+
+    Args:
+        data: The file.
+
+    Returns:
+        The header. A VIEWPOINT at the origin, which writers put there when they know
+        none, counts as none.
+
+    Raises:
+        ValueError: As by `parse_ply`.
+    """
     lines, size = _header_lines(data, "DATA")
     fields = {words[0]: words[1:] for words in lines if words}
-    _check_names(names=fields["FIELDS"])
     sizes = [int(word) for word in fields["SIZE"]]
-    counts = [int(word) for word in fields.get("COUNT", ["1"] * len(sizes))]
-    stride = sum(a * b for a, b in zip(sizes, counts, strict=True))
+    counts = [_count(word) for word in fields.get("COUNT", ["1"] * len(sizes))]
+    kinds = zip(fields["TYPE"], sizes, strict=True)
+    types = [_PCD_TYPES[kind, bytes_] for kind, bytes_ in kinds]
     form = fields["DATA"][0]
-    if form not in ("ascii", "binary", "binary_compressed"):
-        raise ValueError(f"DATA {form} is unknown")
-    count = int(fields["POINTS"][0])
+    if form not in _PCD_FORMS:
+        raise ValueError(f"DATA {form!r} is unknown")
+    place = [float(word) for word in fields.get("VIEWPOINT", ["0"] * 3)[:3]]
+    known = len(place) == 3 and np.isfinite(place).all() and any(place)
     return CloudHeader(
-        count, stride if form == "binary" else 0, form == "binary_compressed", size
+        _count(fields["POINTS"][0]),
+        _point_type(fields["FIELDS"], types, counts),
+        form,
+        size,
+        (place[0], place[1], place[2]) if known else None,
     )
 
 
-def _check_names(names: list[str]) -> None:
+def _header_lines(data: bytes, last: str) -> tuple[list[list[str]], int]:
+    """Returns the words of the header's lines up to one that begins with `last`."""
+    lines, position = [], 0
+    while (end := data.find(b"\n", position, _MAX_HEADER)) >= 0:
+        # A comment may be in any code; what matters is ASCII.
+        words = data[position:end].decode("ascii", "replace").split()
+        position = end + 1
+        lines.append(words)
+        if words and words[0] == last:
+            return lines, position
+    raise ValueError(f"there is no line {last!r}")
+
+
+def _count(word: str) -> int:
+    count = int(word)
+    if not 0 <= count <= MAX_POINTS:
+        raise ValueError(f"a count of {count} is not from 0 to {MAX_POINTS}")
+    return count
+
+
+def _point_type(
+    names: list[str], types: list[str], counts: list[int]
+) -> "np.dtype[Any]":
+    """Makes the type of a point; fields of no name of their own get numbers."""
     missing = [name for name in ("x", "y", "z") if name not in names]
     if missing:
         raise ValueError(f"points have no {', '.join(missing)}")
+    fields: list[Any] = []
+    for number, (name, kind, count) in enumerate(
+        zip(names, types, counts, strict=True)
+    ):
+        if name in ("x", "y", "z"):
+            if names.count(name) > 1 or count != 1:
+                raise ValueError(f"{name} is there more than once")
+            fields.append((name, kind))
+        elif names.count(name) > 1 or name == "_":  # PCL's padding.
+            fields.append((f"_{number}", kind, (count,)))
+        else:
+            fields.append((name, kind, (count,)))
+    if sum(counts) > _MAX_POINT_BYTES:
+        raise ValueError(f"a point of over {_MAX_POINT_BYTES} numbers")
+    return np.dtype(fields)

@@ -1,43 +1,55 @@
-"""Recorded clouds and depth images: read whole, or refused with the reason."""
+"""Recorded clouds: read whole, or refused with the reason."""
 
-import json
+import io
 import math
 import zipfile
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import open3d as o3d
-from PIL import Image
+import numpy.typing as npt
 
-from perception.cloud_header import read_header
+from perception.cloud_header import MAX_POINTS, CloudHeader, parse_pcd, parse_ply
 from perception.errors import CloudReadError
-from perception.values import FloatArray
+from perception.lzf import lzf_decompress
+from perception.values import FloatArray, FrozenValue
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".xyz", ".npy", ".npz")
-DEPTH_SUFFIX = ".png"
-_UNDISTORT_ROUNDS = 20
-_OPTIONAL_INTRINSICS: dict[str, Any] = {
-    "depth_scale_m_per_unit": 0.001,
-    "distortion_k1k2p1p2k3": [0.0] * 5,
-}
+_NAMES = ("points", "xyz", "p_WQs")  # Of the array in an NPZ file, if it has several.
+_LZF_MOST = 90  # Three bytes give at most 264.
 
 
-def read_cloud(path: Path) -> FloatArray:
+@dataclass(frozen=True, eq=False)
+class RecordedCloud(FrozenValue):
+    """Points as a file holds them.
+
+    Attributes:
+        p_WQs: (3, N) float64, in the file's frame and unit; some may be non-finite.
+        p_WC: (3,) where the sensor was, if the file says so.
+    """
+
+    p_WQs: FloatArray
+    p_WC: FloatArray | None = None
+
+
+def read_cloud(path: Path) -> RecordedCloud:
     """Reads the points of a cloud.
 
-    PLY and PCD (ascii, binary, compressed) are read by Open3D; since that gives out
-    what it got of a truncated file, the file is checked against its header first. XYZ
-    is text with x, y and z first in each line. NPY is an array (N, 3) or (3, N), read
-    as (N, 3) when it is 3 x 3; NPZ holds one such array, alone or named "points", "xyz"
-    or "p_WQs".
+    PLY (ascii, binary) and PCD (ascii, binary, compressed) are read by NumPy, after the
+    header was checked against the length of the file: Open3D's readers give out what
+    they got of a truncated file, allocate what a damaged header asks for, and print.
+    XYZ is text with x, y and z first in each line, parted by blanks, commas or
+    semicolons; a first line of words is a heading. NPY is an array (N, 3) or (3, N),
+    read as (N, 3) when it is 3 x 3; NPZ holds one such array, alone or named "points",
+    "xyz" or "p_WQs".
 
     Args:
         path: The file; its suffix tells the form.
 
     Returns:
-        (3, N) in the file's frame and unit; points may be non-finite, not all of them.
+        The cloud; not all of its points are non-finite.
 
     Raises:
         CloudReadError: The file is missing, truncated, empty, of an unknown form or has
@@ -49,61 +61,46 @@ def read_cloud(path: Path) -> FloatArray:
         raise CloudReadError(
             f"{path}: unknown cloud format {suffix!r}; known: {known}."
         )
-    _check_file(path)
+    check_file(path)
+    place = None
     if suffix in (".ply", ".pcd"):
-        points = _read_open3d(path)
+        fields, header = _read_fields(path)
+        xyz = [fields[name].astype(np.float64) for name in "xyz"]
+        points = np.stack(xyz) if fields.size else np.zeros((3, 0))
+        place = header.viewpoint
     elif suffix == ".xyz":
-        points = _read_text(path)
+        points = _read_xyz(path)
     else:
         points = _read_array(path)
-    return _checked(path, points)
+    return RecordedCloud(
+        p_WQs=checked_points(path, points),
+        p_WC=None if place is None else np.array(place),
+    )
 
 
-def read_depth(path: Path, intrinsics_path: Path) -> FloatArray:
-    """Reads a depth image as a cloud.
-
-    The intrinsics are a JSON object with `width`, `height`, `fx`, `fy`, `cx`, `cy` in
-    px, optionally `depth_scale_m_per_unit` (default 0.001) and `distortion_k1k2p1p2k3`,
-    five coefficients of Brown and Conrady, which are taken off.
-
-    Source: Brown, "Close-range camera calibration", 1971.
+def read_fields(path: Path) -> npt.NDArray[Any]:
+    """Reads all that a PLY or PCD file has of its points, such as labels.
 
     Args:
-        path: 16-bit PNG, 0 = no measurement.
-        intrinsics_path: The JSON file.
+        path: The file.
 
     Returns:
-        p_CQs (3, N) m, in C (x right, y down, z ahead); pixels without a measurement
-        are left out.
+        (N,) structured array; the fields x, y and z are numbers, the others rows of
+        them.
 
     Raises:
-        CloudReadError: A file is missing or unusable, or sizes disagree; names the
-            file, the field, the value and the bound.
+        CloudReadError: As by `read_cloud`.
     """
-    camera = _read_intrinsics(intrinsics_path)
-    _check_file(path)
-    try:
-        with Image.open(path) as image:
-            mode, depth = image.mode, np.asarray(image)
-    except (OSError, SyntaxError, ValueError) as error:
-        raise CloudReadError(f"{path}: cannot read the picture: {error}.") from error
-    if depth.ndim != 2 or depth.dtype.itemsize < 2 or depth.dtype.kind not in "iu":
-        raise CloudReadError(f"{path}: expected 16-bit grey depth, got mode {mode!r}.")
-    height, width = depth.shape
-    if (width, height) != (camera["width"], camera["height"]):
-        raise CloudReadError(
-            f"{path}: the image is {width} x {height} px, {intrinsics_path} is for "
-            f"{camera['width']} x {camera['height']} px."
-        )
-    rows, columns = np.nonzero(depth)
-    z = depth[rows, columns] * float(camera["depth_scale_m_per_unit"])
-    x = (columns - camera["cx"]) / camera["fx"]
-    y = (rows - camera["cy"]) / camera["fy"]
-    x, y = _undistorted(x, y, camera["distortion_k1k2p1p2k3"])
-    return _checked(path, np.stack([x * z, y * z, z]))
+    check_file(path)
+    return _read_fields(path)[0]
 
 
-def _check_file(path: Path) -> None:
+def check_file(path: Path) -> None:
+    """Raises CloudReadError, with the reason, for a file that holds nothing.
+
+    Args:
+        path: The file.
+    """
     if not path.is_file():
         reason = "is a folder" if path.is_dir() else "no such file"
         raise CloudReadError(f"{path}: {reason}.")
@@ -116,53 +113,151 @@ def _check_file(path: Path) -> None:
         raise CloudReadError(f"{path}: the file is empty.")
 
 
-def _checked(path: Path, points: FloatArray) -> FloatArray:
-    if points.shape[1] == 0:
+def checked_points(path: Path, points: FloatArray) -> FloatArray:
+    """Returns points as contiguous float64.
+
+    Args:
+        path: Where they are from, for the message.
+        points: (3, N).
+
+    Returns:
+        (3, N).
+
+    Raises:
+        CloudReadError: There are none, too many, or none is finite.
+    """
+    count = points.shape[1]
+    if count == 0:
         raise CloudReadError(f"{path}: the cloud has no points.")
+    if count > MAX_POINTS:
+        raise CloudReadError(f"{path}: {count} points are over {MAX_POINTS}.")
     if not np.any(np.all(np.isfinite(points), axis=0)):
         raise CloudReadError(
-            f"{path}: none of the {points.shape[1]} points is finite (NaN or infinite)."
+            f"{path}: none of the {count} points is finite (NaN or infinite)."
         )
     return np.ascontiguousarray(points, dtype=np.float64)
 
 
-def _read_open3d(path: Path) -> FloatArray:
-    header = read_header(path)
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        cloud = o3d.io.read_point_cloud(
-            path, remove_nan_points=False, remove_infinite_points=False
-        )
-    points: FloatArray = np.asarray(cloud.points, dtype=np.float64).T
-    if points.shape[1] != header.count:
-        raise CloudReadError(
-            f"{path}: the header promises {header.count} points, "
-            f"{points.shape[1]} could be read."
-        )
-    return points
-
-
-def _read_text(path: Path) -> FloatArray:
+def _read_fields(path: Path) -> tuple[npt.NDArray[Any], CloudHeader]:
+    data = path.read_bytes()
+    parse = parse_ply if path.suffix.lower() == ".ply" else parse_pcd
     try:
-        rows = np.loadtxt(path, usecols=(0, 1, 2), ndmin=2, comments=("#", "//"))
-    except (ValueError, IndexError, UnicodeDecodeError) as error:
-        raise CloudReadError(f"{path}: not lines of x, y and z: {error}") from error
-    return rows.T
+        header = parse(data)
+    except (KeyError, ValueError, IndexError) as error:
+        raise CloudReadError(f"{path}: damaged header: {error}.") from error
+    if header.form == "ascii":
+        return _text_fields(path, data[header.size :], header), header
+    body = memoryview(data)[header.size :]
+    if header.form == "binary_compressed":
+        body = memoryview(_decompressed(path, body, header))
+    size = header.count * header.point.itemsize
+    if len(body) < size:
+        raise CloudReadError(
+            f"{path}: truncated: the header promises {header.count} points in "
+            f"{size} bytes, the file has {len(body)}."
+        )
+    if header.form == "binary":
+        return np.frombuffer(body[:size], dtype=header.point), header
+    fields = np.empty(header.count, dtype=header.point)
+    start = 0
+    for name in header.point.names or ():
+        column = header.point[name]
+        end = start + header.count * column.itemsize
+        fields[name] = np.frombuffer(body[start:end], dtype=column)
+        start = end
+    return fields, header
+
+
+def _decompressed(path: Path, body: memoryview, header: CloudHeader) -> bytes:
+    packed = int.from_bytes(body[:4], "little")
+    size = int.from_bytes(body[4:8], "little")
+    if len(body) < 8 + packed:
+        raise CloudReadError(
+            f"{path}: truncated: the header promises {header.count} points in "
+            f"{8 + packed} bytes, the file has {len(body)}."
+        )
+    expected = header.count * header.point.itemsize
+    if size != expected or size > _LZF_MOST * packed:
+        raise CloudReadError(
+            f"{path}: damaged: {packed} bytes cannot be {size} bytes of "
+            f"{header.count} points ({expected} bytes)."
+        )
+    try:
+        return lzf_decompress(bytes(body[8 : 8 + packed]), size)
+    except ValueError as error:
+        raise CloudReadError(f"{path}: the compressed data {error}.") from error
+
+
+def _text_fields(path: Path, body: bytes, header: CloudHeader) -> npt.NDArray[Any]:
+    lines = [line for line in body.splitlines() if line.strip()]
+    if len(lines) < header.count:
+        raise CloudReadError(
+            f"{path}: truncated: the header promises {header.count} points, the "
+            f"file has {len(lines)} lines of data."
+        )
+    fields = np.zeros(header.count, dtype=header.point)
+    if header.count == 0:
+        return fields
+    numbers = _numbers(path, lines[: header.count], columns=None)
+    column = 0
+    for name in header.point.names or ():
+        kind = header.point[name]
+        width = kind.shape[0] if kind.shape else 1
+        block = numbers[:, column : column + width]
+        column += width
+        if block.shape[1] < width:
+            raise CloudReadError(
+                f"{path}: a line has {numbers.shape[1]} numbers, too few for {name}."
+            )
+        if kind.base.kind in "iu":  # A colour may be written as -1 or NaN.
+            block = np.nan_to_num(block, nan=0.0, posinf=0.0, neginf=0.0)
+            block = np.clip(block, -(2.0**62), 2.0**62).astype(np.int64)
+        with np.errstate(over="ignore"):  # Beyond float32: infinite, and dropped.
+            fields[name] = block.astype(kind.base).reshape(fields[name].shape)
+    return fields
+
+
+def _read_xyz(path: Path) -> FloatArray:
+    text = path.read_bytes().translate(bytes.maketrans(b",;", b"  "))
+    lines = [line for line in text.splitlines() if line.strip()]
+    if (
+        len(lines) > 1
+        and lines[0].strip()[:1].isalpha()
+        and lines[0][:3].lower() != b"nan"
+    ):
+        del lines[0]
+    lines = [line for line in lines if not line.lstrip().startswith((b"#", b"//"))]
+    if not lines:
+        raise CloudReadError(f"{path}: the cloud has no points.")
+    return _numbers(path, lines, columns=(0, 1, 2)).T
+
+
+def _numbers(
+    path: Path, lines: list[bytes], *, columns: tuple[int, ...] | None
+) -> FloatArray:
+    try:
+        words = [line.decode("ascii") for line in lines]
+        return np.loadtxt(words, usecols=columns, ndmin=2, comments=None)
+    except (ValueError, IndexError, OverflowError) as error:
+        raise CloudReadError(f"{path}: not lines of x, y and z: {error}.") from error
 
 
 def _read_array(path: Path) -> FloatArray:
     try:
-        content: Any = np.load(path, allow_pickle=False)
         if path.suffix.lower() == ".npz":
-            names = [name for name in ("points", "xyz", "p_WQs") if name in content]
-            names = names or list(content)
-            if len(names) != 1:
-                raise CloudReadError(
-                    f'{path}: expected one array, or one named "points", "xyz" or '
-                    f'"p_WQs", found {", ".join(names) or "none"}.'
-                )
-            content = content[names[0]]
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise CloudReadError(f"{path}: cannot read the array: {error}") from error
+            content = _lone_member(path)
+        else:
+            content = _parse_npy(path.read_bytes())
+    except (
+        OSError,
+        ValueError,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,  # An encrypted archive.
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
+        raise CloudReadError(f"{path}: cannot read the array: {error}.") from error
     if content.ndim == 2 and content.dtype.kind in "fiu":
         if content.shape[1] == 3:
             return np.asarray(content.T, dtype=np.float64)
@@ -174,45 +269,41 @@ def _read_array(path: Path) -> FloatArray:
     )
 
 
-def _read_intrinsics(path: Path) -> dict[str, Any]:
-    """Reads and checks the camera; the optional fields are filled in."""
-    _check_file(path)
-    try:
-        camera: Any = json.loads(path.read_text())
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise CloudReadError(f"{path}: not JSON: {error}") from error
-    if not isinstance(camera, dict):
-        raise CloudReadError(f"{path}: expected a JSON object.")
-    camera = _OPTIONAL_INTRINSICS | camera
-    positive = ("width", "height", "fx", "fy", "depth_scale_m_per_unit")
-    for name in (*positive, "cx", "cy"):
-        value = camera.get(name)
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not math.isfinite(value):
-            raise CloudReadError(f"{path}: {name} must be a number, got {value!r}.")
-        if name in positive and value <= 0:
-            raise CloudReadError(f"{path}: {name} must be > 0, got {value!r}.")
-    coefficients: Any = camera["distortion_k1k2p1p2k3"]
-    if np.array(coefficients).shape != (5,):
-        raise CloudReadError(
-            f"{path}: distortion_k1k2p1p2k3 must be 5 numbers, got {coefficients!r}."
-        )
-    return dict(camera)
+def _lone_member(path: Path) -> npt.NDArray[Any]:
+    with zipfile.ZipFile(path) as archive:
+        members = {Path(info.filename).stem: info for info in archive.infolist()}
+        names = [name for name in _NAMES if name in members] or list(members)
+        if len(names) != 1:
+            raise CloudReadError(
+                f'{path}: expected one array, or one named "points", "xyz" or '
+                f'"p_WQs", found {", ".join(names) or "none"}.'
+            )
+        info = members[names[0]]
+        if info.file_size > 24 * MAX_POINTS:
+            raise ValueError(f"{info.file_size} bytes are over {24 * MAX_POINTS}")
+        with archive.open(info) as file:
+            # One byte more than promised shows a member that is not what it says.
+            return _parse_npy(file.read(info.file_size + 1))
 
 
-def _undistorted(
-    x: FloatArray, y: FloatArray, coefficients: list[float]
-) -> tuple[FloatArray, FloatArray]:
-    """Takes the lens distortion off normalised picture coordinates, by iteration."""
-    k1, k2, p1, p2, k3 = coefficients
-    if not any(coefficients):
-        return x, y
-    seen_x, seen_y = x, y
-    for _ in range(_UNDISTORT_ROUNDS):
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        x, y = (
-            (seen_x - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
-            (seen_y - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial,
-        )
-    return x, y
+def _parse_npy(data: bytes) -> npt.NDArray[Any]:
+    """Reads an array whose data are there; NumPy would allocate first."""
+    file = io.BytesIO(data)
+    version = np.lib.format.read_magic(file)
+    read = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }.get(version)
+    if read is None:
+        raise ValueError(f"NPY version {version} is unknown")
+    shape, fortran, dtype = read(file)
+    if dtype.hasobject or any(length < 0 for length in shape):
+        raise ValueError(f"{dtype} of shape {shape} is no cloud")
+    size = math.prod(shape) * dtype.itemsize
+    rest = len(data) - file.tell()
+    if rest < size:
+        raise ValueError(f"truncated: {size} bytes are promised, there are {rest}")
+    values: npt.NDArray[Any] = np.frombuffer(
+        data, dtype=dtype, count=math.prod(shape), offset=file.tell()
+    )
+    return values.reshape(shape[::-1]).T if fortran else values.reshape(shape)

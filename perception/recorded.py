@@ -1,163 +1,198 @@
 """Segmentation of recorded clouds, for which no job says where the wall is."""
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from perception.config import SegmentationConfig
 from perception.errors import NoWallError
-from perception.planes import Plane
+from perception.planes import fit_plane
+from perception.recorded_tile import (
+    ViewSide,
+    close_gaps,
+    fitting_cell,
+    robust_extent,
+    set_back_wall,
+    side_of_view,
+)
 from perception.segmentation import (
     FoundPlanes,
     SegmentationSteps,
     find_planes,
     segment_tile,
 )
-from perception.values import FloatArray
-from perception.wall import upright_rotation, wall_on_plane
+from perception.values import FloatArray, FrozenValue
+from perception.wall import MIN_POINTS, upright_rotation, wall_on_plane
+from perception.wall_choice import choose_wall
 
-# A plane is a wall if it leans less than this; stairs and ramps lean more.
-_MAX_LEAN = math.radians(20.0)
-# A true surface is denser within the inlier distance than beside it; a slab through
-# foliage is not. Ours: the worst recorded wall reaches 1.8, plants 1.5
-# (docs/real-data.md).
-_MIN_CONTRAST = 1.7
+MAX_CELLS = 4_000_000
+# Points farther than this from the median are no part of any wall a robot paints, and
+# such numbers leave no digits for the rest.
+_STRAY = 1000.0
+# Where the inlier distance is left to the data: so many standard deviations of the
+# wall's points (6e-5 of a normal distribution are beyond), but not below the least.
+_NOISE_FACTOR = 4.0
+_LEAST_INLIER_DISTANCE = 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedWall(FrozenValue):
+    """What was found in a recording.
+
+    Attributes:
+        steps: The segmentation with its intermediate results.
+        side: On which side of the wall the sensor was, and how that is known.
+        inlier_distance: Of the wall's points, m.
+        strays: Points that were left out because they are over a kilometre away.
+        set_back_area: Of the mask that is wall behind the main plane, m².
+    """
+
+    steps: SegmentationSteps
+    side: ViewSide
+    inlier_distance: float
+    strays: int
+    set_back_area: float
 
 
 def segment_recorded(
     p_WQs: FloatArray,
     *,
-    width: float,
-    height: float,
     config: SegmentationConfig,
     seed: int,
+    width: float | None = None,
+    height: float | None = None,
     up_W: FloatArray | None = None,
     distance: float | None = None,
-) -> SegmentationSteps:
+    p_WC: FloatArray | None = None,
+    fit_cell: bool = False,
+    fit_inlier_distance: bool = False,
+    set_back: float = 0.0,
+) -> RecordedWall:
     """Finds the wall of a recorded cloud and segments a tile in the middle of it.
 
     The wall is the largest plane that may be one: upright if `up_W` is given, at
-    `distance` from the sensor (W's origin) if that is given, and a surface rather than
-    a slab through clutter. The tile is centred on the middle of its points.
+    `distance` from the sensor if that is given, no face of a carton, and a surface
+    rather than a slab through clutter. The tile is centred on the middle of its points.
 
     Args:
-        p_WQs: (3, N) m, in the recording's frame W, whose origin is the sensor.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        p_WQs: (3, N) m, in the recording's frame W.
         config: Thresholds of the steps.
         seed: Of RANSAC's random triples.
+        width: Of the tile, m; if left out, as wide as what is seen of the wall.
+        height: Of the tile, m; likewise.
         up_W: (3,) which way is up; if left out, the picture's -y is taken for T's
             orientation and floors are not told from walls.
         distance: Expected distance of the wall, m; `config.wall_distance_tolerance` is
             its tolerance.
+        p_WC: (3,) where the sensor was, in W; if left out, see `side_of_view`.
+        fit_cell: Whether cells may be larger than `config.cell` where the points are
+            too sparse for it; then gaps of one or two cells are closed, too.
+        fit_inlier_distance: Whether the wall's points may be taken closer than within
+            `config.distance_threshold` where there is little noise.
+        set_back: How far behind the wall's plane parts of the wall may lie that it
+            does not enclose (dormers), m; 0 = none.
 
     Returns:
-        The segmentation with its intermediate results.
+        The wall; its segmentation's cell is the one used.
 
     Raises:
         NoWallError: There are too few points or no such plane; names the reasons.
     """
-    found = find_planes(p_WQs, config=config, seed=seed)
-    number = _choose(found, config=config, up_W=up_W, distance=distance)
+    points = _without_strays(p_WQs)
+    found = find_planes(points, config=config, seed=seed)
+    number = choose_wall(found, config=config, up_W=up_W, distance=distance, p_WC=p_WC)
+    limit = config.distance_threshold
+    if fit_inlier_distance:
+        found, limit = _with_close_inliers(found, number, limit)
     plane = found.planes[number]
+    on_wall = found.p_WQs[:, found.labels == number + 1]
+    side = side_of_view(plane, found.p_WQs[:, found.kept], limit=limit, p_WC=p_WC)
     up_T = np.array([0.0, -1.0, 0.0]) if up_W is None else up_W
-    X_WT = _centred_tile(
-        plane,
-        found.p_WQs[:, found.labels == number + 1],
-        up_T,
-        width=width,
-        height=height,
+    R_WT = upright_rotation(side.normal_W, _across(up_T, side.normal_W))
+    p_TQs = R_WT.inverse() @ on_wall
+    shown = p_TQs
+    if set_back > 0.0:
+        shown = R_WT.inverse() @ found.p_WQs[:, found.kept]
+        depth = shown[2] - np.median(p_TQs[2])
+        shown = shown[:, (depth >= -set_back) & (depth <= limit)]
+    middle, extent = robust_extent(shown)
+    middle[2] = np.median(p_TQs[2])
+    size = (
+        extent[0] if width is None else width,
+        extent[1] if height is None else height,
     )
-    wall = wall_on_plane(
-        plane, X_WT, width=width, height=height, total=found.kept_count
+    cell = least_cell = config.cell
+    if fit_cell:
+        cell = fitting_cell(p_TQs[:2], least=cell)
+        cell = max(cell, math.sqrt(size[0] * size[1] / MAX_CELLS))
+    # An extent from the data is a whole number of cells.
+    tile = {
+        "width": size[0] if width is not None else _whole(size[0], cell),
+        "height": size[1] if height is not None else _whole(size[1], cell),
+    }
+    corner = middle - [tile["width"] / 2.0, tile["height"] / 2.0, 0.0]
+    X_WT = RigidTransform(R_WT, R_WT @ corner)
+    wall = wall_on_plane(plane, X_WT, **tile, total=found.kept_count)
+    config = dataclasses.replace(config, cell=cell, distance_threshold=limit)
+    steps = segment_tile(found, wall, number + 1, **tile, config=config)
+    area = 0.0
+    if set_back > 0.0:
+        steps, area = set_back_wall(steps, set_back=set_back)
+    if cell > least_cell:
+        steps = close_gaps(steps)
+    return RecordedWall(
+        steps=steps,
+        side=side,
+        inlier_distance=limit,
+        strays=int(np.isfinite(p_WQs).all(axis=0).sum()) - points.shape[1],
+        set_back_area=area,
     )
-    return segment_tile(
-        found, wall, number + 1, width=width, height=height, config=config
-    )
 
 
-def contrast(plane: Plane, p_WQs: FloatArray, *, threshold: float) -> float:
-    """Compares the density of points at a plane with that beside it.
-
-    Args:
-        plane: In W.
-        p_WQs: (3, N) m, in W.
-        threshold: Inlier distance, m.
-
-    Returns:
-        Points within `threshold` of the plane, over the mean of the numbers in slabs of
-        the same thickness on either side; infinite if these are empty.
-    """
-    away = np.abs(plane.distances(p_WQs))
-    inside = np.count_nonzero(away <= threshold)
-    beside = np.count_nonzero((away > threshold) & (away <= 3.0 * threshold)) / 2.0
-    return inside / beside if beside else math.inf
+def _without_strays(p_WQs: FloatArray) -> FloatArray:
+    """Leaves out points that are not finite or absurdly far from the median."""
+    finite = p_WQs[:, np.all(np.isfinite(p_WQs), axis=0)]
+    if finite.shape[1] == 0:
+        raise NoWallError(
+            f"the cloud has 0 finite points of {p_WQs.shape[1]}; "
+            f"a wall needs at least {MIN_POINTS}."
+        )
+    with np.errstate(over="ignore"):
+        away = np.abs(finite - np.median(finite, axis=1, keepdims=True))
+    return finite[:, np.all(away <= _STRAY, axis=0)]
 
 
-def _choose(
-    found: FoundPlanes,
-    *,
-    config: SegmentationConfig,
-    up_W: FloatArray | None,
-    distance: float | None,
-) -> int:
-    """Returns the index of the largest plane that may be a wall."""
-    total = found.kept_count
-    kept = found.p_WQs[:, found.kept]
-    reasons = []
-    order = sorted(range(len(found.planes)), key=lambda i: -found.planes[i].count)
-    for number in order:
-        plane = found.planes[number]
-        reason = _objection(plane, kept, config=config, up_W=up_W, distance=distance)
-        if reason is None:
-            return number
-        reasons.append(f"{plane.count / total:.0%} of points {reason}")
-    raise NoWallError(f"no plane is a wall: {_listing(reasons) or 'there is none'}.")
+def _with_close_inliers(
+    found: FoundPlanes, number: int, limit: float
+) -> tuple[FoundPlanes, float]:
+    """Takes from a plane the points farther from it than its noise explains."""
+    own = np.flatnonzero(found.labels == number + 1)
+    away = np.abs(found.planes[number].distances(found.p_WQs[:, own]))
+    # 0.6745: median of the absolute value of a standard normal variable.
+    fitted = _NOISE_FACTOR * float(np.median(away)) / 0.6745
+    fitted = max(fitted, _LEAST_INLIER_DISTANCE)
+    if fitted >= limit:
+        return found, limit
+    plane = fit_plane(found.p_WQs[:, own[away <= fitted]])
+    away = np.abs(plane.distances(found.p_WQs[:, own]))
+    labels = found.labels.copy()
+    labels[own[away > fitted]] = 0
+    planes = list(found.planes)
+    planes[number] = fit_plane(found.p_WQs[:, labels == number + 1])
+    return found.replace(labels=labels, planes=tuple(planes)), fitted
 
 
-def _objection(
-    plane: Plane,
-    p_WQs: FloatArray,
-    *,
-    config: SegmentationConfig,
-    up_W: FloatArray | None,
-    distance: float | None,
-) -> str | None:
-    """Says why a plane is no wall, or None."""
-    if plane.count < config.min_wall_share * p_WQs.shape[1]:
-        return f"is under {config.min_wall_share:.0%}"
-    if up_W is not None:
-        lean = math.asin(min(1.0, abs(float(plane.normal @ up_W))))
-        if lean > _MAX_LEAN:
-            limit = math.degrees(_MAX_LEAN)
-            return f"leans {math.degrees(lean):.0f} deg, over {limit:.0f}"
-    if distance is not None:
-        limit = config.wall_distance_tolerance
-        if abs(abs(plane.offset) - distance) > limit:
-            return f"is {abs(plane.offset):.3f} m away, not {distance:g} +- {limit:g}"
-    ratio = contrast(plane, p_WQs, threshold=config.distance_threshold)
-    if ratio < _MIN_CONTRAST:
-        return f"is {ratio:.1f} times as dense as beside it, under {_MIN_CONTRAST:g}"
-    return None
+def _across(up_W: FloatArray, normal_W: FloatArray) -> FloatArray:
+    """Returns up, or another axis where up is along the normal."""
+    if abs(float(normal_W @ up_W)) > math.cos(math.radians(10.0)) * float(
+        np.linalg.norm(up_W)
+    ):
+        return np.roll(up_W, 1)
+    return up_W
 
 
-def _listing(reasons: Sequence[str], most: int = 3) -> str:
-    more = f"; and {len(reasons) - most} more" if len(reasons) > most else ""
-    return "; ".join(reasons[:most]) + more
-
-
-def _centred_tile(
-    plane: Plane, p_WQs: FloatArray, up_W: FloatArray, *, width: float, height: float
-) -> RigidTransform:
-    """Lays a tile on the plane, centred on the middle of the plane's points."""
-    normal = plane.normal * (-1.0 if plane.offset > 0.0 else 1.0)  # To the sensor.
-    if abs(float(normal @ up_W)) > math.cos(math.radians(10.0)):
-        up_W = np.roll(up_W, 1)  # Up is along the normal; any axis across it will do.
-    R_WT = upright_rotation(normal, up_W)
-    p_Qs = R_WT.inverse() @ p_WQs
-    # The middle of the extents, without the stray points at either end.
-    low, high = np.percentile(p_Qs, [1.0, 99.0], axis=1)
-    centre = (low + high) / 2.0 - [width / 2.0, height / 2.0, 0.0]
-    return RigidTransform(R_WT, R_WT @ centre)
+def _whole(length: float, cell: float) -> float:
+    return max(1, math.ceil(length / cell)) * cell

@@ -83,6 +83,7 @@ HARDWARE_MODULES = {
     "painter.systems.canopen_arm",
     "painter.systems.canopen_gun",
     "painter.systems.depth_camera_driver",
+    "perception.bag_io",
 }
 
 

@@ -1,6 +1,6 @@
 """`painter segment`: a recorded cloud or depth image to wall and rest."""
 
-import enum
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -16,43 +16,18 @@ from painter.cli.common import (
     output_folder,
     print_result,
 )
+from painter.cli.recorded_input import (
+    Unit,
+    parse_direction,
+    parse_point,
+    parse_tile,
+    read_input,
+)
 from painter.config import load_scenario
 from painter.errors import InputError
 from painter.run.recorded_wall import write_recorded_wall
-from perception.cloud_io import DEPTH_SUFFIX, read_cloud, read_depth
 from perception.config import SegmentationConfig
-from perception.recorded import segment_recorded
-from perception.values import FloatArray
-
-
-class Axis(enum.StrEnum):
-    """A direction of the cloud's frame."""
-
-    X = "x"
-    MINUS_X = "-x"
-    Y = "y"
-    MINUS_Y = "-y"
-    Z = "z"
-    MINUS_Z = "-z"
-
-    @property
-    def vector(self) -> FloatArray:
-        """(3,) unit vector."""
-        sign = -1.0 if self.value.startswith("-") else 1.0
-        return sign * np.eye(3)["xyz".index(self.value[-1])]
-
-
-class Unit(enum.StrEnum):
-    """A unit of length."""
-
-    M = "m"
-    CM = "cm"
-    MM = "mm"
-
-    @property
-    def metres(self) -> float:
-        """Its length, m."""
-        return {"m": 1.0, "cm": 0.01, "mm": 0.001}[self.value]
+from perception.recorded import MAX_CELLS, segment_recorded
 
 
 def segment(
@@ -60,7 +35,8 @@ def segment(
         Path,
         typer.Argument(
             metavar="CLOUD",
-            help="PLY, PCD, XYZ, NPY or NPZ file, or a 16-bit depth PNG.",
+            help="PLY, PCD, XYZ, NPY or NPZ file; 16-bit depth PNG, or a folder of "
+            "them from a camera and scene at rest; RealSense .bag or .db3 recording.",
         ),
     ],
     out: OutOption,
@@ -68,32 +44,68 @@ def segment(
         Path | None,
         typer.Option(
             metavar="JSON",
-            help="Camera of a depth PNG: width, height, fx, fy, cx, cy, in px.",
+            help="Camera of a depth PNG: width, height, fx, fy, cx, cy, in px.  "
+            "[default: intrinsics.json beside it]",
         ),
     ] = None,
     up: Annotated[
-        Axis | None,
+        str | None,
         typer.Option(
-            help="Which way is up in the cloud's frame; then floors are no walls. "
-            "Without it the mask is turned as in a camera's picture (up = -y)."
+            metavar="AXIS",
+            help="Which way is up in the cloud's frame, as z, -y or X,Y,Z; then floors "
+            "are no walls. Without it the mask is turned as in a camera's picture "
+            "(up = -y).",
         ),
     ] = None,
-    unit: Annotated[Unit, typer.Option(help="Unit of the cloud's numbers.")] = Unit.M,
-    tile: Annotated[
-        str,
+    unit: Annotated[Unit, typer.Option(help="Unit of a cloud's numbers.")] = Unit.M,
+    viewpoint: Annotated[
+        str | None,
         typer.Option(
-            metavar="WxH", help="Size of the tile, centred on the wall seen, m."
+            metavar="X,Y,Z",
+            help="Where the sensor was, in the cloud's frame, m; tells the wall's "
+            "front from its back.  [default: as a PCD file says; the origin; of a map "
+            "far from its origin, the side that openings do not lie on]",
         ),
-    ] = "2x2",
+    ] = None,
+    tile: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WxH",
+            help="Size of the tile, centred on the wall seen, m.  [default: all of it]",
+        ),
+    ] = None,
     cell: Annotated[
         float | None,
-        typer.Option(help="Edge of a grid cell, m.  [default: 0.01]"),
+        typer.Option(
+            help="Edge of a grid cell, m.  [default: 0.01, or as the points' spacing "
+            "needs]"
+        ),
     ] = None,
+    inlier_distance: Annotated[
+        float | None,
+        typer.Option(
+            help="How far a point of the wall may be from its plane, m.  [default: "
+            "four standard deviations of its noise, 0.006 to 0.03]"
+        ),
+    ] = None,
+    set_back: Annotated[
+        float,
+        typer.Option(
+            help="How far behind the plane parts of the wall may lie that stand beside "
+            "it, such as dormers, m."
+        ),
+    ] = 0.0,
     distance: Annotated[
         float | None,
         typer.Option(
-            help="Expected distance of the wall from the frame's origin, m.  "
-            "[default: any]"
+            help="Expected distance of the wall from the sensor, m.  [default: any]"
+        ),
+    ] = None,
+    max_range: Annotated[
+        float | None,
+        typer.Option(
+            help="Leave out points farther than this from the sensor, m.  "
+            "[default: none]"
         ),
     ] = None,
     overrides: SetOption = None,
@@ -104,25 +116,47 @@ def segment(
 
     Writes segmentation.npz, segmentation.json, segmentation.png and wall_mask.png.
     """
-    width, height = _tile_size(tile)
-    if distance is not None and not distance > 0.0:
-        raise InputError(f"--distance must be > 0 m, got {distance!r}.")
-    config = _config(overrides, cell)
-    _check_grid(width, height, config.cell)
-    points = _read(cloud, intrinsics) * unit.metres
-    steps = segment_recorded(
+    width, height = (None, None) if tile is None else parse_tile(tile)
+    _check_positive(
+        cell=cell,
+        inlier_distance=inlier_distance,
+        distance=distance,
+        max_range=max_range,
+    )
+    if not 0.0 <= set_back < math.inf:
+        raise InputError(f"--set-back must be >= 0 m, got {set_back!r}.")
+    words = list(overrides or ())
+    if cell is not None:
+        words.append(f"segmentation.cell={cell!r}")
+    if inlier_distance is not None:
+        words.append(f"segmentation.distance_threshold={inlier_distance!r}")
+    config = load_scenario("blank", words).segmentation
+    if width is not None and height is not None:
+        _check_grid(width, height, config)
+    up_W = None if up is None else parse_direction(up)
+    place = None if viewpoint is None else parse_point(viewpoint)
+    recording = read_input(cloud, intrinsics=intrinsics, unit=unit)
+    p_WC = recording.p_WC if place is None else place
+    points = recording.p_WQs
+    if max_range is not None:
+        with np.errstate(over="ignore"):
+            offsets = points - (np.zeros(3) if p_WC is None else p_WC)[:, None]
+            points = points[:, np.linalg.norm(offsets, axis=0) <= max_range]
+    wall = segment_recorded(
         points,
         width=width,
         height=height,
         config=config,
         seed=seed,
-        up_W=None if up is None else up.vector,
+        up_W=up_W,
         distance=distance,
+        p_WC=p_WC,
+        fit_cell=not _is_set(words, "cell"),
+        fit_inlier_distance=not _is_set(words, "distance_threshold"),
+        set_back=set_back,
     )
     with output_folder(out) as folder:
-        figures = write_recorded_wall(
-            folder, steps, title=cloud.name, threshold=config.distance_threshold
-        )
+        figures = write_recorded_wall(folder, wall, title=cloud.name)
     if as_json:
         print_result(figures, as_json=True)
         return
@@ -134,43 +168,28 @@ def segment(
     typer.echo(f"written to {out}")
 
 
-def _read(cloud: Path, intrinsics: Path | None) -> FloatArray:
-    is_depth = cloud.suffix.lower() == DEPTH_SUFFIX
-    if not is_depth:
-        if intrinsics is not None:
-            raise InputError(f"--intrinsics is for a depth PNG; {cloud} is none.")
-        return read_cloud(cloud)
-    if intrinsics is None:
-        raise InputError(f"{cloud}: a depth image needs --intrinsics JSON.")
-    return read_depth(cloud, intrinsics)
+def _check_positive(**values: float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not 0.0 < value < math.inf:
+            option = "--" + name.replace("_", "-")
+            raise InputError(f"{option} must be > 0 m, got {value!r}.")
 
 
-def _tile_size(words: str) -> tuple[float, float]:
-    try:
-        width, height = (float(word) for word in words.lower().split("x"))
-    except ValueError:
-        raise InputError(f"--tile must be WxH in m, e.g. 2x2, got {words!r}.") from None
-    if not (0.0 < width < np.inf and 0.0 < height < np.inf):
-        raise InputError(f"--tile must be > 0 m, got {words!r}.")
-    return width, height
+def _is_set(words: list[str], field: str) -> bool:
+    """Tells whether the words set a field of the segmentation."""
+    return any(word.partition("=")[0] == f"segmentation.{field}" for word in words)
 
 
-def _config(overrides: list[str] | None, cell: float | None) -> SegmentationConfig:
-    words = [*(overrides or ()), *([f"segmentation.cell={cell!r}"] if cell else [])]
-    if cell is not None and not cell > 0.0:
-        raise InputError(f"--cell must be > 0 m, got {cell!r}.")
-    return load_scenario("blank", words).segmentation
-
-
-def _check_grid(width: float, height: float, cell: float, most: float = 4e6) -> None:
+def _check_grid(width: float, height: float, config: SegmentationConfig) -> None:
+    cell = config.cell
     if min(width, height) < cell:
         raise InputError(
             f"--tile {width:g}x{height:g} is smaller than a cell, {cell:g} m."
         )
-    if width * height / cell**2 > most:
+    if width * height / cell**2 > MAX_CELLS:
         raise InputError(
             f"--tile {width:g}x{height:g} with cells of {cell:g} m has more than "
-            f"{most:.0e} cells; take a larger --cell."
+            f"{MAX_CELLS:.0e} cells; take a larger --cell."
         )
 
 

@@ -7,26 +7,27 @@ from typing import Any
 import numpy as np
 
 from painter.run.segmentation_picture import segmentation_picture
-from perception.recorded import contrast
+from perception.recorded import RecordedWall
 from perception.segmentation import SegmentationSteps
 from perception.store import save_segmentation, save_wall_mask
+from perception.wall_choice import contrast
 
 
 def write_recorded_wall(
-    folder: Path, steps: SegmentationSteps, *, title: str, threshold: float
+    folder: Path, wall: RecordedWall, *, title: str
 ) -> dict[str, Any]:
     """Writes `segmentation.npz`, `.json` and `.png` and `wall_mask.png`.
 
     Args:
         folder: Where to write; exists.
-        steps: The segmentation with its intermediate results.
+        wall: What was found.
         title: Heading of the picture.
-        threshold: Inlier distance of the planes, m.
 
     Returns:
         The figures that were written to `segmentation.json`.
     """
-    figures = segmentation_figures(steps, threshold=threshold)
+    figures = segmentation_figures(wall)
+    steps = wall.steps
     save_segmentation(folder / "segmentation.npz", steps.segmentation)
     save_wall_mask(folder / "wall_mask.png", steps.segmentation.wall_mask)
     (folder / "segmentation.json").write_text(json.dumps(figures, indent=2) + "\n")
@@ -34,19 +35,18 @@ def write_recorded_wall(
     return figures
 
 
-def segmentation_figures(
-    steps: SegmentationSteps, *, threshold: float
-) -> dict[str, Any]:
+def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
     """Sums a segmentation up in JSON values.
 
     Args:
-        steps: The segmentation with its intermediate results.
-        threshold: Inlier distance of the planes, m.
+        wall: What was found.
 
     Returns:
         Counts of points; the wall's distance from the origin of the cloud's frame,
-        normal (towards it) and rms; areas; and lists of planes and of regions.
+        normal (to the side it was seen from) and rms; cell and inlier distance used;
+        areas; and lists of planes and of regions.
     """
+    steps = wall.steps
     result, found = steps.segmentation, steps.found
     area = result.cell**2
     normal = result.X_WT.rotation().matrix()[:, 2]
@@ -55,12 +55,17 @@ def segmentation_figures(
     seen = result.labels > 0
     return {
         "points": int(found.kept.size),
+        "strays": wall.strays,
         "outliers": int(found.kept.size - found.kept_count),
+        "seen_from": wall.side.source.value,
+        "cell_m": _rounded(result.cell),
+        "inlier_distance_m": _rounded(wall.inlier_distance),
         "wall_distance_m": _rounded(abs(plane.offset)),
         "wall_normal": [_rounded(value) for value in normal],
         "wall_rms_m": _rounded(steps.wall.rms),
         "wall_point_share": _rounded(steps.wall.inlier_share),
-        "wall_contrast": _finite(contrast(plane, kept, threshold=threshold)),
+        "wall_contrast": _finite(contrast(plane, kept, threshold=wall.inlier_distance)),
+        "set_back_area_m2": _rounded(wall.set_back_area),
         "wall_area_m2": _rounded(np.count_nonzero(result.wall_mask) * area),
         "other_area_m2": _rounded(np.count_nonzero(seen & ~result.wall_mask) * area),
         "unseen_area_m2": _rounded(np.count_nonzero(~seen) * area),

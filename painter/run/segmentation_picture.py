@@ -19,7 +19,7 @@ _DEPTH_LIMIT = 0.15  # Of the colour scale, m.
 
 
 def segmentation_picture(path: Path, steps: SegmentationSteps, *, title: str) -> None:
-    """Draws the input, the labels, the depth and the mask side by side.
+    """Draws the input, the labels, the residuals and the mask side by side.
 
     Args:
         path: PNG file to write.
@@ -28,14 +28,18 @@ def segmentation_picture(path: Path, steps: SegmentationSteps, *, title: str) ->
     """
     result = steps.segmentation
     ny, nx = result.labels.shape
-    panel = 4.2
-    figure = style.new_figure(4 * panel + 1.2, panel * min(1.6, ny / nx) + 1.6)
-    axes = figure.subplots(1, 4, sharex=True, sharey=True)
-    draw_points(axes[0], steps)
-    draw_labels(axes[1], result)
-    draw_depth(axes[2], result)
-    draw_mask(axes[3], result)
-    for ax in axes[1:]:
+    # Side by side; of a long wall two by two, of a very long one in a column.
+    columns = 4 if nx < 1.6 * ny else 2 if nx < 4 * ny else 1
+    rows = 4 // columns
+    width = {4: 4.3, 2: 7.5, 1: 13.0}[columns]
+    height = (width - 1.1) * min(2.5, ny / nx) + 1.25
+    figure = style.new_figure(columns * width, rows * height + 0.5)
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    draw_points(axes.flat[0], steps)
+    draw_labels(axes.flat[1], result)
+    draw_residuals(axes.flat[2], result)
+    draw_mask(axes.flat[3], result)
+    for ax in axes[:, 1:].flat:
         ax.set_ylabel("")
     figure.suptitle(title, fontsize=13, fontweight="bold", x=0.01, ha="left")
     path.write_bytes(style.png(figure, dpi=110))
@@ -59,7 +63,9 @@ def draw_points(ax: Axes, steps: SegmentationSteps) -> None:
     shown = shown[np.argsort(p_TQs[2, shown])]
     dots: dict[str, Any] = {"s": 1.2, "linewidths": 0, "rasterized": True}
     x, y, z = p_TQs[:, shown]
-    ax.scatter(x, y, c=z, cmap="RdYlBu", norm=_depth_norm(), **dots)
+    norm = _depth_norm(scale=100.0)
+    points = ax.scatter(x, y, c=100.0 * z, cmap="RdYlBu", norm=norm, **dots)
+    _add_bar(ax, points, "cm before the wall's plane")
     x, y, _ = p_TQs[:, inside & ~found.kept]
     ax.scatter(x, y, c="black", **{**dots, "s": 3.0})
     removed = found.kept.size - found.kept_count
@@ -98,14 +104,16 @@ def draw_labels(ax: Axes, result: WallSegmentation) -> None:
         vmax=count + 0.5,
         **_placement(result),
     )
-    ax.legend(
-        handles=handles,
-        fontsize=7,
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.12),
-        ncols=3,
-        frameon=False,
-    )
+    if handles:
+        ax.legend(
+            handles=handles,
+            fontsize=7,
+            loc="upper left",
+            bbox_to_anchor=(1.01, 1.0),
+            borderaxespad=0.0,
+            handlelength=1.0,
+            frameon=False,
+        )
     _finish(ax, result, f"Labels ({count} regions by area)")
 
 
@@ -123,10 +131,27 @@ def draw_depth(ax: Axes, result: WallSegmentation) -> None:
         norm=_depth_norm(scale=100.0),
         **_placement(result),
     )
-    bar = ax.figure.colorbar(image, ax=ax, shrink=0.75, pad=0.02, extend="both")
-    bar.set_label("cm before the wall's plane", fontsize=8)
-    bar.ax.tick_params(labelsize=8)
+    _add_bar(ax, image, "cm before the wall's plane")
     _finish(ax, result, "Depth")
+
+
+def draw_residuals(ax: Axes, result: WallSegmentation) -> None:
+    """Draws how far the wall's cells are from its plane.
+
+    Args:
+        ax: Where to draw.
+        result: The segmentation.
+    """
+    ax.set_facecolor(_UNSEEN)
+    residuals = np.where(result.wall_mask, 1000.0 * result.depth, np.nan)
+    measured = residuals[np.isfinite(residuals)]
+    away = np.abs(measured - np.median(measured)) if measured.size else np.zeros(1)
+    limit = max(1.0, float(np.percentile(away, 95.0)))
+    image = ax.imshow(
+        residuals, cmap="RdBu", vmin=-limit, vmax=limit, **_placement(result)
+    )
+    _add_bar(ax, image, "mm before the wall's plane")
+    _finish(ax, result, f"Residuals of the wall (95 % within {limit:.0f} mm)")
 
 
 def draw_mask(ax: Axes, result: WallSegmentation) -> None:
@@ -139,6 +164,14 @@ def draw_mask(ax: Axes, result: WallSegmentation) -> None:
     ax.imshow(result.wall_mask, cmap="gray", vmin=0, vmax=1, **_placement(result))
     area = np.count_nonzero(result.wall_mask) * result.cell**2
     _finish(ax, result, f"Mask (white = paint, {area:.2f} m²)")
+
+
+def _add_bar(ax: Axes, colored: Any, label: str) -> None:
+    """Adds a bar of colours that takes the same room beside each panel."""
+    place = ax.inset_axes((1.02, 0.0, 0.025, 1.0))
+    bar = ax.figure.colorbar(colored, cax=place, extend="both")
+    bar.set_label(label, fontsize=8)
+    bar.ax.tick_params(labelsize=8)
 
 
 def _depth_norm(scale: float = 1.0) -> TwoSlopeNorm:

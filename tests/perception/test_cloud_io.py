@@ -7,7 +7,8 @@ import open3d as o3d
 import pytest
 from PIL import Image
 
-from perception.cloud_io import read_cloud, read_depth
+from perception.cloud_io import read_cloud
+from perception.depth_io import read_depth
 from perception.errors import CloudReadError
 
 POINTS = np.random.default_rng(0).uniform(-2.0, 2.0, (3, 200)).astype(np.float32)
@@ -43,7 +44,7 @@ def cloud_file(request, tmp_path):
 
 
 def test_every_form_gives_the_same_points(cloud_file):
-    points = read_cloud(cloud_file)
+    points = read_cloud(cloud_file).p_WQs
     assert points.shape == (3, 200)
     assert points.dtype == np.float64
     # Open3D writes six digits as text.
@@ -125,7 +126,7 @@ def test_some_points_may_be_missing(tmp_path):
     points = POINTS.copy()
     points[:, :50] = np.nan
     np.save(tmp_path / "cloud.npy", points)
-    assert np.isnan(read_cloud(tmp_path / "cloud.npy")).sum() == 150
+    assert np.isnan(read_cloud(tmp_path / "cloud.npy").p_WQs).sum() == 150
 
 
 def write_depth(folder, depth, camera=CAMERA):

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from perception.cloud_io import read_cloud, read_depth
+from perception.cloud_io import read_cloud
 from perception.config import SegmentationConfig
+from perception.depth_io import read_depth
 from perception.errors import NoWallError
 from perception.planes import fit_plane
-from perception.recorded import contrast, segment_recorded
+from perception.recorded import segment_recorded
 from perception.synthetic import synthetic_wall
+from perception.wall_choice import contrast
 
 DATA = Path(os.environ.get("PAINTER_DATA", "../shared/data")) / "real"
 UP_Z = np.array([0.0, 0.0, 1.0])
@@ -28,7 +30,7 @@ def segment(points, *, width=2.0, height=2.0, **options):
     config = options.pop("config", SegmentationConfig())
     return segment_recorded(
         points, width=width, height=height, config=config, seed=1, **options
-    )
+    ).steps
 
 
 def wall(patches=()):
@@ -123,7 +125,7 @@ needs_data = pytest.mark.skipif(
     ],
 )
 def test_walls_of_another_painting_robot_are_found(name, distance, normal):
-    points = read_cloud(DATA / "painting_robot_wall_scans" / f"{name}.pcd")
+    points = read_cloud(DATA / "painting_robot_wall_scans" / f"{name}.pcd").p_WQs
     # Scan lines are 2 to 5 cm apart; z points down.
     config = SegmentationConfig(cell=0.05)
     steps = segment(points, width=4.0, height=4.0, up_W=-UP_Z, config=config)
