@@ -1,0 +1,151 @@
+"""Time-stamped setpoints: a buffer with interpolation, and the ramp of a stop."""
+
+import bisect
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from painter.canopen.units import FloatArray, JointLimits
+
+_MOST = 4096
+_STILL = 1e-6
+
+
+@dataclass(frozen=True)
+class Setpoint:
+    """Where the arm shall be at a time.
+
+    Attributes:
+        time: Clock of the bus, s.
+        q: (5,) rad.
+        v: (5,) rad/s.
+        trigger: 0 to 1 of nominal flow.
+    """
+
+    time: float
+    q: FloatArray
+    v: FloatArray
+    trigger: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What is commanded now.
+
+    Attributes:
+        q: (5,) rad.
+        v: (5,) rad/s.
+        trigger: 0 to 1 of nominal flow.
+        lag: Time since the last setpoint, s; 0 inside the buffer.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    trigger: float
+    lag: float
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it moves or sprays, so that the next setpoint must not be late."""
+        return self.trigger > 0.0 or bool(np.any(np.abs(self.v) > _STILL))
+
+
+class SetpointBuffer:
+    """Setpoints ahead of now; cubic between two (positions and speeds of both)."""
+
+    def __init__(self) -> None:
+        """Creates an empty buffer."""
+        self._points: list[Setpoint] = []
+
+    def __len__(self) -> int:
+        """Number of setpoints held."""
+        return len(self._points)
+
+    def clear(self) -> None:
+        """Forgets all setpoints."""
+        self._points = []
+
+    def push(self, points: Sequence[Setpoint]) -> None:
+        """Adds setpoints; later ones replace what was planned for the same times.
+
+        Raises:
+            ValueError: They are not in order of time, or not finite.
+        """
+        times = [point.time for point in points]
+        if any(b <= a for a, b in itertools.pairwise(times)):
+            raise ValueError("setpoints must be in order of time.")
+        for point in points:
+            values = np.concatenate([point.q, point.v, [point.time, point.trigger]])
+            if values.shape != (12,) or not np.isfinite(values).all():
+                raise ValueError(
+                    f"setpoint at {point.time!r} s is not finite (5,)+(5,)."
+                )
+            if not 0.0 <= point.trigger <= 1.0:
+                raise ValueError(f"trigger must be 0 to 1, got {point.trigger!r}.")
+        if points:
+            keep = bisect.bisect_left(self._points, times[0], key=lambda p: p.time)
+            self._points = [*self._points[:keep], *points][-_MOST:]
+
+    def sample(self, now: float) -> Sample | None:
+        """Returns the command at `now`; None while none has begun."""
+        after = bisect.bisect_right(self._points, now, key=lambda p: p.time)
+        if after == 0:
+            return None
+        if after > 1:
+            del self._points[: after - 1]
+        first = self._points[0]
+        if len(self._points) == 1:
+            return Sample(first.q, first.v, first.trigger, now - first.time)
+        second = self._points[1]
+        q, v = _cubic(first, second, now)
+        return Sample(q, v, first.trigger, 0.0)
+
+
+def _cubic(a: Setpoint, b: Setpoint, now: float) -> tuple[FloatArray, FloatArray]:
+    """Hermite's cubic between two setpoints."""
+    h = b.time - a.time
+    s = (now - a.time) / h
+    q = (
+        (1 + 2 * s) * (1 - s) ** 2 * a.q
+        + s * (1 - s) ** 2 * h * a.v
+        + s * s * (3 - 2 * s) * b.q
+        + s * s * (s - 1) * h * b.v
+    )
+    v = (
+        6 * s * (s - 1) / h * (a.q - b.q)
+        + (3 * s - 1) * (s - 1) * a.v
+        + s * (3 * s - 2) * b.v
+    )
+    return q, v
+
+
+class StopRamp:
+    """A controlled stop: all joints slow down evenly and stand at the same time."""
+
+    def __init__(
+        self, now: float, q: FloatArray, v: FloatArray, limits: Sequence[JointLimits]
+    ) -> None:
+        """Creates the ramp.
+
+        Args:
+            now: When it begins, s.
+            q: (5,) where the arm is commanded to be, rad.
+            v: (5,) how fast, rad/s.
+            limits: Of each joint; `a_max` gives the duration.
+        """
+        self._start, self._q, self._v = now, q.copy(), v.copy()
+        a_max = np.array([limit.a_max for limit in limits])
+        self.duration = float(np.max(np.abs(v) / a_max, initial=0.0))
+        self._low = np.array([limit.q_min for limit in limits])
+        self._high = np.array([limit.q_max for limit in limits])
+
+    def sample(self, now: float) -> Sample:
+        """Returns the command at `now`, within the joints' ranges."""
+        t = min(now - self._start, self.duration)
+        if self.duration <= 0.0:
+            return Sample(self._q, np.zeros(5), 0.0, 0.0)
+        q = self._q + self._v * (t - t * t / (2.0 * self.duration))
+        v = self._v * (1.0 - t / self.duration)
+        return Sample(np.clip(q, self._low, self._high), v, 0.0, 0.0)

@@ -1,0 +1,51 @@
+"""A motor with its load under a position loop: second order, with limits."""
+
+from dataclasses import dataclass
+
+# Natural frequency, rad/s, and damping of the closed loop: our choice, of the order of
+# what servo drives with harmonic gears reach.
+_FREQUENCY = 120.0
+_DAMPING = 1.0
+
+
+@dataclass
+class Motor:
+    """Position and velocity in counts and counts/s.
+
+    Attributes:
+        position: Where the axis is.
+        velocity: How fast it goes.
+        acceleration_limit: What the torque allows, counts/s².
+        friction: Deceleration of the motor without power, counts/s².
+        is_blocked: True if something holds the axis; fault injection.
+    """
+
+    position: float = 0.0
+    velocity: float = 0.0
+    acceleration_limit: float = 1e9
+    friction: float = 1e6
+    is_blocked: bool = False
+
+    def drive(self, demand: float, demand_velocity: float, dt: float) -> None:
+        """Moves under power towards a demand.
+
+        Source: PD with velocity feed-forward,
+        a = w² (demand - x) + 2 d w (demand velocity - v), integrated semi-implicitly.
+        """
+        if self.is_blocked:
+            self.velocity = 0.0
+            return
+        wanted = _FREQUENCY**2 * (demand - self.position)
+        wanted += 2.0 * _DAMPING * _FREQUENCY * (demand_velocity - self.velocity)
+        limit = self.acceleration_limit
+        self.velocity += min(limit, max(-limit, wanted)) * dt
+        self.position += self.velocity * dt
+
+    def coast(self, dt: float, *, brake: bool) -> None:
+        """Moves without power: the brake holds at once, friction does slowly."""
+        if brake or self.is_blocked:
+            self.velocity = 0.0
+            return
+        loss = min(abs(self.velocity), self.friction * dt)
+        self.velocity -= loss if self.velocity > 0.0 else -loss
+        self.position += self.velocity * dt

@@ -1,0 +1,237 @@
+"""A simulated CANopen node: NMT, heartbeats, SYNC, PDOs, SDO server, emergencies.
+
+Source: CiA 301 v4.2.0; clauses are named where they count.
+"""
+
+import enum
+from collections.abc import Callable
+
+from painter.canopen.device import DeviceDescription
+from painter.canopen.frames import (
+    HEARTBEAT_BASE,
+    NMT_ID,
+    SDO_TO_CLIENT,
+    SDO_TO_SERVER,
+    SYNC_ID,
+    Frame,
+)
+from painter.canopen.od_types import Value
+from painter.canopen.sim.pdo import Pdo, PdoEngine
+from painter.canopen.sim.sdo_server import SdoServer
+from painter.canopen.sim.store import ObjectStore
+from painter.canopen.sim.wire import Wire
+
+
+class Nmt(enum.IntEnum):
+    """NMT states as heartbeats say them; clause 7.2.8.3.2.2."""
+
+    INITIALISING = 0
+    STOPPED = 4
+    OPERATIONAL = 5
+    PRE_OPERATIONAL = 127
+
+
+# NMT commands, clause 7.2.8.2.1.
+NMT_START = 1
+NMT_STOP = 2
+NMT_PRE_OPERATIONAL = 128
+NMT_RESET_NODE = 129
+NMT_RESET_COMMUNICATION = 130
+
+HEARTBEAT_LOST = 0x8130
+PDO_LENGTH = 0x8210
+BOOT_TIME = 0.02
+
+
+class SimNode:
+    """One node on a wire; drives and I/O nodes add what they do."""
+
+    def __init__(
+        self, node_id: int, description: DeviceDescription, wire: Wire
+    ) -> None:
+        """Creates a node that boots when it is stepped for the first time."""
+        self.node_id = node_id
+        self.store = ObjectStore(description)
+        self.pdos = PdoEngine(self.store)
+        self.sdo = SdoServer(self.store)
+        self.store.written = lambda *written: self.on_write(*written)
+        self.nmt = Nmt.INITIALISING
+        self.silent = False
+        self.tpdo_silent = False
+        self.now = 0.0
+        self._send: Callable[[Frame, float], None] = wire.attach(self.receive)
+        self._boot_at = BOOT_TIME
+        self._next_heartbeat = 0.0
+        self._heard: dict[int, float] = {}
+        self._latched: list[tuple[Pdo, bytes]] = []
+        self._sync_count = 0
+        self._next_event: dict[int, float] = {}
+        self._sent: dict[int, bytes] = {}
+
+    # What children add.
+
+    def on_reset(self) -> None:
+        """The node was reset; the store has its power-on values."""
+
+    def on_sync(self, now: float) -> None:
+        """A SYNC came and synchronous RPDOs are in the store."""
+
+    def on_write(self, index: int, sub: int, value: Value) -> None:
+        """An RPDO or SDO wrote an object."""
+
+    def on_connection_lost(self) -> None:
+        """The master's heartbeat stayed away, or it stopped the node."""
+
+    def refresh(self) -> None:
+        """Values are about to be read: brings the store up to date."""
+
+    # The bus.
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """Sends a frame unless the node is silenced."""
+        if not self.silent:
+            self._send(Frame(cob_id, data), self.now)
+
+    def receive(self, frame: Frame, now: float) -> None:
+        """Takes a frame that ended at `now`."""
+        self.now = max(self.now, now)
+        if frame.is_error:
+            return
+        if frame.cob_id == NMT_ID:
+            if len(frame.data) == 2 and frame.data[1] in (0, self.node_id):
+                self._nmt_command(frame.data[0])
+        elif self.nmt == Nmt.INITIALISING or self.silent:
+            return
+        elif frame.cob_id == SYNC_ID:
+            self._sync()
+        elif frame.cob_id == SDO_TO_SERVER + self.node_id:
+            if self.nmt != Nmt.STOPPED:
+                self._serve(frame.data)
+        elif HEARTBEAT_BASE < frame.cob_id < HEARTBEAT_BASE + 128:
+            self._heard[frame.cob_id - HEARTBEAT_BASE] = now
+        elif self.nmt == Nmt.OPERATIONAL:
+            self._take_rpdo(frame)
+
+    def step(self, now: float) -> None:
+        """Lets time pass: boot, heartbeats, event timers."""
+        self.now = max(self.now, now)
+        if self.nmt == Nmt.INITIALISING:
+            if self.now >= self._boot_at:
+                self.nmt = Nmt.PRE_OPERATIONAL
+                self.send(HEARTBEAT_BASE + self.node_id, b"\0")
+                self._next_heartbeat = self.now
+            return
+        period = self.store.number(0x1017) / 1e3
+        if period and self.now >= self._next_heartbeat:
+            self._next_heartbeat = self.now + period
+            self.send(HEARTBEAT_BASE + self.node_id, bytes([self.nmt]))
+        self._watch_heartbeats()
+        if self.nmt == Nmt.OPERATIONAL:
+            self._send_events()
+
+    def reboot(self) -> None:
+        """Resets the node, as power loss would."""
+        self._nmt_command(NMT_RESET_NODE)
+
+    def emergency(self, code: int, register: int) -> None:
+        """Sends an EMCY and keeps it in 1001h, 1003h and 603Fh; code 0 is the end."""
+        self.store.set(0x1001, 0, register)
+        if code:
+            count = min(self.store.number(0x1003) + 1, 8)
+            for sub in range(count, 1, -1):
+                self.store.set(0x1003, sub, self.store.number(0x1003, sub - 1))
+            self.store.set(0x1003, 1, code)
+            self.store.set(0x1003, 0, count)
+        data = code.to_bytes(2, "little") + bytes([register, 0, 0, 0, 0, 0])
+        self.send(0x80 + self.node_id, data)
+
+    def _nmt_command(self, command: int) -> None:
+        if command in (NMT_RESET_NODE, NMT_RESET_COMMUNICATION):
+            only = command == NMT_RESET_COMMUNICATION
+            self.store.power_on(communication_only=only)
+            self.pdos.invalidate()
+            self.sdo.reset()
+            self._heard, self._latched, self._sent = {}, [], {}
+            self.nmt = Nmt.INITIALISING
+            self._boot_at = self.now + BOOT_TIME
+            if not only:
+                self.on_reset()
+            return
+        states = {
+            NMT_START: Nmt.OPERATIONAL,
+            NMT_STOP: Nmt.STOPPED,
+            NMT_PRE_OPERATIONAL: Nmt.PRE_OPERATIONAL,
+        }
+        if self.nmt == Nmt.INITIALISING or command not in states:
+            return
+        was, self.nmt = self.nmt, states[command]
+        if was == Nmt.OPERATIONAL != self.nmt:
+            self.on_connection_lost()
+
+    def _serve(self, request: bytes) -> None:
+        self.refresh()
+        answer = self.sdo.answer(request)
+        if answer is not None:
+            self.send(SDO_TO_CLIENT + self.node_id, answer)
+
+    def _take_rpdo(self, frame: Frame) -> None:
+        for pdo in self.pdos.received():
+            if pdo.cob_id != frame.cob_id:
+                continue
+            if len(frame.data) < sum(size for _, _, size in pdo.objects):
+                self.emergency(PDO_LENGTH, 0x11)
+            elif pdo.transmission <= 240:
+                self._latched.append((pdo, frame.data))
+            else:
+                self._apply(pdo, frame.data)
+
+    def _apply(self, pdo: Pdo, data: bytes) -> None:
+        for index, sub, value in self.pdos.split(pdo, data):
+            self.store.set(index, sub, value)
+            self.on_write(index, sub, value)
+
+    def _sync(self) -> None:
+        self._sync_count += 1
+        if self.nmt != Nmt.OPERATIONAL:
+            return
+        latched, self._latched = self._latched, []
+        for pdo, data in latched:
+            self._apply(pdo, data)
+        self.on_sync(self.now)
+        self.refresh()
+        for pdo in self.pdos.transmitted():
+            every = max(1, pdo.transmission)
+            if pdo.transmission <= 240 and self._sync_count % every == 0:
+                self._transmit(pdo)
+
+    def _send_events(self) -> None:
+        events = [pdo for pdo in self.pdos.transmitted() if pdo.transmission >= 254]
+        if events:
+            self.refresh()
+        for pdo in events:
+            data = self.pdos.data(pdo)
+            due = pdo.event_time and self.now >= self._next_event.get(pdo.number, 0.0)
+            if due or data != self._sent.get(pdo.number):
+                self._next_event[pdo.number] = self.now + pdo.event_time
+                self._transmit(pdo)
+
+    def _transmit(self, pdo: Pdo) -> None:
+        if not self.tpdo_silent:
+            data = self.pdos.data(pdo)
+            self._sent[pdo.number] = data
+            self.send(pdo.cob_id, data)
+
+    def _watch_heartbeats(self) -> None:
+        """Consumer heartbeat time, 1016h; armed by the first heartbeat heard."""
+        for sub in range(1, self.store.number(0x1016) + 1):
+            entry = self.store.number(0x1016, sub)
+            producer, limit = entry >> 16 & 0x7F, (entry & 0xFFFF) / 1e3
+            heard = self._heard.get(producer)
+            if heard is not None and limit and self.now - heard > limit:
+                del self._heard[producer]
+                self.emergency(HEARTBEAT_LOST, 0x11)
+                self.on_connection_lost()
+                if self.store.number(0x1029, 1) == 0 and self.nmt == Nmt.OPERATIONAL:
+                    self.nmt = Nmt.PRE_OPERATIONAL
+                elif self.store.number(0x1029, 1) == 2:
+                    self.nmt = Nmt.STOPPED

@@ -1,0 +1,182 @@
+"""All simulated nodes of a bus file on one wire, and faults by name."""
+
+import enum
+from collections import deque
+
+from painter.canopen.bus_config import BusConfig
+from painter.canopen.frames import ERROR_BUS_OFF, Frame
+from painter.canopen.links import LinkError
+from painter.canopen.sim.drive import SimDrive
+from painter.canopen.sim.io_node import SimIo
+from painter.canopen.sim.node import SimNode
+from painter.canopen.sim.wire import Wire
+from painter.canopen.units import AXES
+
+STEP = 0.001
+
+
+class Fault(enum.StrEnum):
+    """Faults that can be injected."""
+
+    EMCY = "emcy"  # The drive reports DC link under-voltage.
+    FOLLOWING_ERROR = "following_error"  # Something blocks the axis.
+    HEARTBEAT_LOST = "heartbeat_lost"  # The node falls silent.
+    NODE_RESET = "node_reset"  # The node reboots.
+    TPDO_SILENT = "tpdo_silent"  # Heartbeats go on, process data does not.
+    SDO_ABORT = "sdo_abort"  # The limits cannot be written.
+    WRONG_IDENTITY = "wrong_identity"  # Another product is on the node-ID.
+    WRONG_UNIT = "wrong_unit"  # The encoder has twice the counts.
+    BRAKE_STUCK = "brake_stuck"  # The brake does not open.
+    ESTOP = "estop"  # The e-stop chain opens; the axis does not count.
+    PRESSURE_LOW = "pressure_low"  # The pump stops; the axis does not count.
+    BUS_OFF = "bus_off"  # The master's controller goes bus-off.
+    INTERFACE_DOWN = "interface_down"  # The master's adapter is unplugged.
+
+
+class Rack:
+    """The simulated nodes of a bus, in simulated time."""
+
+    def __init__(self, bus: BusConfig) -> None:
+        """Creates all drives and the I/O node, before their boot-up.
+
+        Args:
+            bus: What is on the bus; drives have the objects of their EDS.
+        """
+        self.bus = bus
+        self.wire = Wire(bus.bitrate)
+        self.drives: dict[str, SimDrive] = {}
+        for name in AXES:
+            config = bus.drives[name]
+            drive = SimDrive(
+                config.node_id, bus.device(name), self.wire, units=config.units()
+            )
+            for sub, wanted in enumerate(
+                (config.identity.vendor, config.identity.product), start=1
+            ):
+                if wanted:
+                    drive.store.fix(0x1018, sub, wanted)
+            self.drives[name] = drive
+        self.io = SimIo(bus.io.node_id, self.wire)
+        self.link = WireLink(self)
+        self.now = 0.0
+
+    @property
+    def nodes(self) -> list[SimNode]:
+        """All nodes, drives first."""
+        return [*self.drives.values(), self.io]
+
+    def advance(self, until: float) -> None:
+        """Lets frames, motors and timers run, 1 ms a step."""
+        while self.now + STEP <= until + 1e-9:
+            self.now += STEP
+            self.wire.advance(self.now)
+            for node in self.nodes:
+                node.step(self.now)
+        self.wire.advance(until)
+
+    def inject(self, fault: Fault, axis: str = "base_yaw") -> None:
+        """Makes a fault happen now.
+
+        Args:
+            fault: What fails.
+            axis: Which drive; counts only for faults of a drive.
+        """
+        drive = self.drives[axis]
+        if fault == Fault.EMCY:
+            drive.trip(0x3220)
+        elif fault == Fault.FOLLOWING_ERROR:
+            drive.motor.is_blocked = True
+        elif fault == Fault.HEARTBEAT_LOST:
+            drive.silent = True
+        elif fault == Fault.NODE_RESET:
+            drive.reboot()
+        elif fault == Fault.TPDO_SILENT:
+            drive.tpdo_silent = True
+        elif fault == Fault.SDO_ABORT:
+            drive.sdo.refused[0x607D, 1] = 0x08000022
+        elif fault == Fault.WRONG_IDENTITY:
+            drive.store.fix(0x1018, 2, 0xBAD)
+        elif fault == Fault.WRONG_UNIT:
+            drive.store.fix(0x608F, 1, drive.store.number(0x608F, 1) * 2)
+        elif fault == Fault.BRAKE_STUCK:
+            drive.brake_stuck = True
+        elif fault == Fault.ESTOP:
+            self.io.inputs &= ~(1 << self.bus.io.estop_bit)
+        elif fault == Fault.PRESSURE_LOW:
+            self.io.pressure = 0
+        elif fault == Fault.BUS_OFF:
+            self.link.bus_off()
+        elif fault == Fault.INTERFACE_DOWN:
+            self.link.is_down = True
+
+    def clear(self) -> None:
+        """Ends all faults that last; tripped drives still need their reset."""
+        for name, drive in self.drives.items():
+            drive.motor.is_blocked = drive.silent = drive.tpdo_silent = False
+            drive.brake_stuck = False
+            drive.sdo.refused.clear()
+            identity = self.bus.drives[name].identity
+            drive.store.fix(0x1018, 2, identity.product)
+            drive.store.fix(0x608F, 1, round(self.bus.drives[name].counts_per_turn))
+        self.io.inputs = 0xFF
+        self.io.pressure = 100
+        self.link.is_down = False
+
+
+class WireLink:
+    """The master's port on the wire of a rack, in the same thread."""
+
+    def __init__(self, rack: Rack) -> None:
+        """Attaches to the wire."""
+        self._rack = rack
+        self._frames: deque[Frame] = deque()
+        self._is_off = False
+        self.is_down = False
+        self._send = rack.wire.attach(self._take)
+
+    def send(self, frame: Frame) -> None:
+        """Sends now; a controller that is bus-off loses it.
+
+        Raises:
+            LinkError: The adapter is unplugged.
+        """
+        self._check()
+        if not self._is_off:
+            self._send(frame, self._rack.now)
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Returns what came; simulated time does not pass in here.
+
+        Raises:
+            LinkError: The adapter is unplugged.
+        """
+        self._check()
+        frames = list(self._frames)
+        self._frames.clear()
+        return frames
+
+    def reopen(self) -> None:
+        """Starts the controller again.
+
+        Raises:
+            LinkError: The adapter is unplugged.
+        """
+        self._check()
+        self._is_off = False
+        self._frames.clear()
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def bus_off(self) -> None:
+        """Makes the controller go bus-off, and say so."""
+        self._is_off = True
+        self._frames.append(Frame(ERROR_BUS_OFF, bytes(8), is_error=True))
+
+    def _take(self, frame: Frame, now: float) -> None:
+        if not self._is_off and not self.is_down:
+            self._frames.append(frame)
+
+    def _check(self) -> None:
+        if self.is_down:
+            raise LinkError("the CAN interface is down.")

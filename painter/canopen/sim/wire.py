@@ -1,0 +1,87 @@
+"""A CAN wire in simulated time: arbitration, and the time each frame takes."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from painter.canopen.frames import Frame, frame_time
+
+Receiver = Callable[[Frame, float], None]
+
+
+@dataclass(frozen=True, order=True)
+class _Pending:
+    """A frame that waits for the wire; sorts as arbitration does."""
+
+    cob_id: int
+    order: int
+    ready: float
+    port: int
+    frame: Frame
+
+
+class Wire:
+    """Carries frames between ports, one after the other, lowest identifier first.
+
+    Every frame is charged the most bits it can take, so a design that passes here
+    passes on copper.
+    """
+
+    def __init__(self, bitrate: int) -> None:
+        """Creates an idle wire.
+
+        Args:
+            bitrate: Bits a second.
+        """
+        self._bitrate = bitrate
+        self._receivers: list[Receiver] = []
+        self._pending: list[_Pending] = []
+        self._order = itertools.count()
+        self._free = 0.0
+        self.busy_time = 0.0
+        self.frame_count = 0
+
+    def attach(self, receiver: Receiver) -> Callable[[Frame, float], None]:
+        """Adds a port.
+
+        Args:
+            receiver: Gets each frame of the other ports, and the time it ended, s.
+
+        Returns:
+            A function that sends a frame from this port at a time, s.
+        """
+        port = len(self._receivers)
+        self._receivers.append(receiver)
+
+        def send(frame: Frame, now: float) -> None:
+            item = _Pending(frame.cob_id, next(self._order), now, port, frame)
+            self._pending.append(item)
+
+        return send
+
+    def next_end(self) -> float | None:
+        """When the next frame will have ended, s; None while none waits."""
+        if not self._pending:
+            return None
+        start, item = self._choose()
+        return start + frame_time(len(item.frame.data), self._bitrate)
+
+    def advance(self, until: float) -> None:
+        """Carries all frames that end by then, and those they cause."""
+        while self._pending:
+            start, item = self._choose()
+            end = start + frame_time(len(item.frame.data), self._bitrate)
+            if end > until:
+                return
+            self._pending.remove(item)
+            self._free = end
+            self.busy_time += end - start
+            self.frame_count += 1
+            for port, receive in enumerate(self._receivers):
+                if port != item.port:
+                    receive(item.frame, end)
+
+    def _choose(self) -> tuple[float, _Pending]:
+        """Start time and frame that wins the next arbitration."""
+        start = max(self._free, min(item.ready for item in self._pending))
+        return start, min(item for item in self._pending if item.ready <= start)
