@@ -121,7 +121,8 @@ class ScanConfig:
     """First sight of the wall and the zig-zag scan.
 
     Attributes:
-        look_distance: Camera to expected wall at first sight, m.
+        look_distance: Camera to expected wall at first sight, m; the arm has less far
+            to fold, and to turn from side to side, than for a look from farther off.
         look_time: How long the arm holds still for first sight, s.
         distance: Camera to wall during the scan, m; up to a fifth less where the arm
             cannot fold back so far.
@@ -130,7 +131,7 @@ class ScanConfig:
         margin: How far beyond the tile's edge the pictures reach, m.
     """
 
-    look_distance: float = 0.8
+    look_distance: float = 0.6
     look_time: float = 0.6
     distance: float = 0.70
     speed: float = 0.25

@@ -9,6 +9,7 @@ from pydrake.planning import CollisionChecker
 from painter.errors import CollisionError, ReachError
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.deposition import mean_film
+from painter.planning.blend import MovingState
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
 from painter.planning.joint_motion import Segment, chain, planning_limits, start_times
 from painter.planning.kinematics import ArmKinematics, ArmLimits
@@ -18,6 +19,7 @@ from painter.planning.raster import plan_strokes
 from painter.planning.reach import require_reach
 from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
 from painter.planning.stroke_lines import nominal_pitch
+from painter.planning.stroke_order import order_strokes
 from painter.planning.verify import verify_motion, verify_strokes
 from perception.values import FloatArray, WallSegmentation
 
@@ -25,7 +27,13 @@ _STEP = 0.02  # m along a stroke, between the places that are looked at.
 # m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
 # the room in which the arm stops and turns at 0.6 m/s.
 _STOPPING = 0.12
+# Share of the strokes' length; if more is out of reach the arm stands in the wrong
+# place.
+_MOST_OUT_OF_REACH = 0.05
 _TRIMS = (0.0, 0.02, 0.05, 0.10, 0.20)  # m, off a stroke's end for room to turn.
+
+# m and m/s; strokes whose flow alone differs follow one another without a gap.
+_SAME = 1e-9
 
 
 def plan_program(
@@ -38,11 +46,13 @@ def plan_program(
     tip: TipConfig,
     raster: RasterConfig,
     motion: MotionConfig,
+    from_stroke: float = 1.0,
 ) -> PaintProgram:
     """Plans strokes over the wall alone and the motion that makes them.
 
-    Strokes that come nearer than the clearance to an obstacle are cut back; what is
-    cut, and strokes that cannot be come to, stand in the program's `skipped`.
+    Strokes that come nearer than the clearance to an obstacle, or out of reach, are cut
+    back; what is cut, and strokes that cannot be come to, stand in the program's
+    `skipped`.
 
     Args:
         segmentation: Of the tile.
@@ -53,14 +63,61 @@ def plan_program(
         tip: The spray tip.
         raster: Settings of the strokes.
         motion: Settings of the motion.
+        from_stroke: Number of the stroke to begin with, from 1; 12.4 begins where four
+            tenths of the twelfth are done.
 
     Returns:
         The program, verified; its motion ends at the home pose.
 
     Raises:
-        ReachError: A stroke is out of the arm's reach.
+        ValueError: There is no such stroke.
+        ReachError: More than a twentieth of the strokes is out of the arm's reach.
         CollisionError: There is no clear way to any stroke, or home.
         MotionLimitError: The finished motion fails its verification.
+    """
+    wanted = plan_strokes(
+        np.asarray(segmentation.wall_mask), segmentation.cell, tip=tip, raster=raster
+    )
+    return program_of(
+        wanted,
+        segmentation,
+        q0,
+        kinematics=kinematics,
+        limits=limits,
+        checker=checker,
+        tip=tip,
+        raster=raster,
+        motion=motion,
+        from_stroke=from_stroke,
+    )
+
+
+def program_of(
+    wanted: Sequence[Stroke],
+    segmentation: WallSegmentation,
+    q0: FloatArray,
+    *,
+    kinematics: ArmKinematics,
+    limits: ArmLimits,
+    checker: CollisionChecker,
+    tip: TipConfig,
+    raster: RasterConfig,
+    motion: MotionConfig,
+    from_stroke: float = 1.0,
+) -> PaintProgram:
+    """Plans the motion that makes given strokes; see `plan_program`.
+
+    Args:
+        wanted: Strokes in T, in any order and direction.
+        segmentation: Of the tile; what stands before the wall is kept clear of.
+        q0: See `plan_program`, as all that follows.
+        kinematics: Of the arm.
+        limits: Of its joints.
+        checker: Of the robot's cell.
+        tip: The spray tip.
+        raster: Settings of the strokes.
+        motion: Settings of the motion.
+        from_stroke: Number of the stroke to begin with.
     """
     gun = SquareGun(kinematics, segmentation.X_WT)
     space = ClearSpace(
@@ -76,11 +133,15 @@ def plan_program(
         space=space,
         q_home=np.deg2rad(motion.home_deg),
     )
-    wanted = plan_strokes(
-        np.asarray(segmentation.wall_mask), segmentation.cell, tip=tip, raster=raster
-    )
     clear, skipped = _clear_strokes(wanted, linker, raster)
-    path, strokes, passes, unlinked = _link(clear, q0, linker)
+    # The same order wherever the arm starts from, so that a resumed job finds it again.
+    _, p_WGs = kinematics.gun_poses(linker.q_home[None])
+    p_TG_home = gun.X_WT.inverse() @ p_WGs[0]
+    ordered = order_strokes(clear, p_TG_home, p_TG_home)
+    path, strokes, passes, unlinked = _link(ordered, q0, linker)
+    if from_stroke != 1.0:
+        rest = strokes_from(strokes, from_stroke)
+        path, strokes, passes, unlinked = _link(rest, q0, linker)
     starts = start_times(path)[:-1]
     flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
     spray_on = np.reshape(flows, (-1, 2)) - tip.valve_delay
@@ -110,6 +171,29 @@ def plan_program(
     return program
 
 
+def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke, ...]:
+    """Returns what is left of strokes once those before a number are done.
+
+    Args:
+        strokes: In order of execution.
+        from_stroke: Number of the first, from 1; its fraction is the share of that
+            stroke that is done.
+
+    Raises:
+        ValueError: There is no such stroke.
+    """
+    if not 1.0 <= from_stroke < len(strokes) + 1.0:
+        raise ValueError(
+            f"from_stroke must be 1 to {len(strokes)}, the number of strokes, got "
+            f"{from_stroke!r}."
+        )
+    first = int(from_stroke)
+    return (
+        _part(strokes[first - 1], from_stroke - first, 1.0),
+        *strokes[first:],
+    )
+
+
 def nominal_film(
     segmentation: WallSegmentation, *, tip: TipConfig, raster: RasterConfig
 ) -> float:
@@ -125,16 +209,19 @@ def _clear_strokes(
     """Cuts strokes back to what keeps clear; returns what stays and what does not."""
     clear: list[Stroke] = []
     skipped: list[SkippedStroke] = []
-    for number, stroke in enumerate(strokes):
+    out_of_reach: list[FloatArray] = []
+    for stroke in strokes:
         count = max(2, int(np.ceil(stroke.length / _STEP)) + 1)
         share = np.linspace(0.0, 1.0, count)
         p_TGs = _nozzle(
             stroke.start_T + np.outer(share, stroke.end_T - stroke.start_T),
             stroke.standoff,
         )
-        what = f"stroke {number + 1} on line {stroke.column + 1}"
-        q = require_reach(p_TGs, gun=linker.gun, limits=linker.limits, what=what)
-        free = linker.space.free(q)
+        q = linker.gun.solve(p_TGs)
+        reached = linker.limits.contains(q)
+        free = np.array(reached)
+        free[reached] = linker.space.free(q[reached])
+        out_of_reach += [p_TGs[~reached]] if not reached.all() else []
         if free.all():
             clear.append(stroke)
             continue
@@ -154,7 +241,16 @@ def _clear_strokes(
                 skipped.append(SkippedStroke(part, "shorter than raster.min_stroke"))
             else:
                 middle = (first + last) // 2
-                skipped.append(SkippedStroke(part, linker.space.worst_pair(q[middle])))
+                reason = (
+                    linker.space.worst_pair(q[middle])
+                    if reached[middle]
+                    else "out of the arm's reach"
+                )
+                skipped.append(SkippedStroke(part, reason))
+    if out_of_reach:
+        points, total = np.concatenate(out_of_reach), sum(s.length for s in strokes)
+        if len(points) * _STEP > _MOST_OUT_OF_REACH * total:
+            require_reach(points, gun=linker.gun, limits=linker.limits, what="strokes")
     return clear, skipped
 
 
@@ -227,6 +323,8 @@ def _fit(wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker) -> _
         try:
             if last is None:
                 link = linker.from_rest(q0, start)
+            elif _goes_on(last.end, start):
+                link = []
             else:
                 link = linker.between(last.end, start)
         except (CollisionError, ReachError) as error:
@@ -238,6 +336,13 @@ def _fit(wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker) -> _
             stroke, link, [SkippedStroke(part, first_failure) for part in left_out]
         )
     return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
+
+
+def _goes_on(end: MovingState, start: MovingState) -> bool:
+    """Returns whether a stroke goes on where the last one ends, without a bend."""
+    return bool(
+        np.abs(end.x - start.x).max() < _SAME and np.abs(end.v - start.v).max() < _SAME
+    )
 
 
 def _pass(stroke: Stroke) -> Pass:

@@ -13,7 +13,7 @@ import numpy as np
 from painter.errors import CollisionError, PainterError, ReachError
 from painter.planning.config import ScanConfig, TileConfig
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
-from painter.planning.joint_motion import SEARCH_SHARE, Segment
+from painter.planning.joint_motion import SEARCH_SHARE, Segment, rest_to_rest
 from painter.planning.linker import Linker
 from painter.planning.reach import require_reach
 from perception.values import FloatArray, FrozenValue
@@ -24,6 +24,8 @@ _BASELINE = 0.050  # m; the left edge of a stereo depth image is blind for so mu
 _ROW_STEP = 0.01  # m, between the row heights that are tried.
 _POINT_STEP = 0.02  # m, between the places on a row that are looked at.
 _DISTANCE_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8)  # Of the scan distance, tried in turn.
+_LOOK_SPREAD = 0.3  # m, of first looks around the middle of a quarter,
+_LOOK_TICKS = 5  # and how many are tried in either direction.
 _SHORTEST_ROW = 0.05  # m; a row is a pass and a pass has a direction.
 
 
@@ -70,27 +72,38 @@ def look_segments(
 
     One look at the middle would do for a bare wall; where there is a window in the
     middle it would show anything but the wall. Two quarters that lie across from one
-    another give the wall's tilt about both axes.
+    another give the wall's tilt about both axes. Of the poses in either quarter those
+    two are taken that are come to in the least time; pictures are taken on the way as
+    well.
 
     Raises:
         ReachError: The camera can stand before a quarter nowhere.
         CollisionError: There is no clear way.
     """
-    path: list[Segment] = []
-    q = q0
     # Ends at the upper left, where the scan begins.
-    for x, y in ((0.75, 0.25), (0.25, 0.75)):
-        q_next = look_pose(np.array([x * tile.width, y * tile.height]), scan, linker)
-        path += linker.transit(q, q_next)
-        q = q_next
-    return path
+    lower, upper = (
+        look_poses(np.array([x * tile.width, y * tile.height]), scan, linker)
+        for x, y in ((0.75, 0.25), (0.25, 0.75))
+    )
+    limits = linker.limits.replace(torques=None)  # To compare, rates will do.
+
+    def times(starts: FloatArray, ends: FloatArray) -> FloatArray:
+        return np.array(
+            [[rest_to_rest(a, b, limits).duration for b in ends] for a in starts]
+        )
+
+    total = times(q0[None], lower).T + times(lower, upper)
+    first, second = np.unravel_index(int(np.argmin(total)), total.shape)
+    return [
+        *linker.transit(q0, lower[first]),
+        *linker.transit(lower[first], upper[second]),
+    ]
 
 
-def look_pose(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatArray:
-    """Finds the pose that looks nearest to a place, where the arm can stand.
+def look_poses(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatArray:
+    """Finds the poses that look at a place or near it, where the arm can stand.
 
-    Straight before the shoulder the arm would have to fold flat, so the nearest place
-    within half a metre beside, above or below is taken.
+    Straight before the shoulder the arm would have to fold flat.
 
     Args:
         centre_T: (2,) m, in T's x and y.
@@ -98,25 +111,23 @@ def look_pose(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatAr
         linker: Reach and clearance.
 
     Returns:
-        (5,) rad.
+        (n, 5) rad, n >= 1, the camera within 0.3 m beside, above or below the place.
 
     Raises:
         ReachError: The camera can stand at that distance nowhere near.
     """
-    x, y = np.meshgrid(np.arange(-0.5, 0.55, 0.1), np.arange(-0.5, 0.525, 0.05))
-    offsets = np.stack([x.ravel(), y.ravel()], axis=-1)
-    nearest_first = np.argsort(np.linalg.norm(offsets, axis=1), kind="stable")
-    p_TCs = np.column_stack(
-        [centre_T + offsets[nearest_first], np.full(len(offsets), scan.look_distance)]
-    )
-    good = _standable(nozzle_under_camera(p_TCs, linker.gun), linker)
+    ticks = _LOOK_SPREAD * np.linspace(-1.0, 1.0, _LOOK_TICKS)
+    x, y = np.meshgrid(centre_T[0] + ticks, centre_T[1] + ticks)
+    p_TCs = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, scan.look_distance)])
+    p_TGs = nozzle_under_camera(p_TCs, linker.gun)
+    good = _standable(p_TGs, linker)
     if not good.any():
         raise ReachError(
             f"look: no clear pose with the camera {scan.look_distance:.2f} m before "
-            f"the wall within 0.5 m of T ({centre_T[0]:.2f}, {centre_T[1]:.2f}) m."
+            f"the wall within {_LOOK_SPREAD} m of T ({centre_T[0]:.2f}, "
+            f"{centre_T[1]:.2f}) m."
         )
-    p_TG = nozzle_under_camera(p_TCs[[int(np.argmax(good))]], linker.gun)
-    return np.array(linker.gun.solve(p_TG)[0])
+    return linker.gun.solve(p_TGs[good])
 
 
 def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:

@@ -6,8 +6,8 @@ from pydrake.math import RigidTransform
 
 from painter.errors import MotionLimitError, ReachError
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
-from painter.planning.program import plan_program
-from painter.planning.spray_path import Motion
+from painter.planning.program import plan_program, program_of
+from painter.planning.spray_path import Motion, Stroke
 from painter.planning.verify import verify_motion, verify_strokes
 
 HOME = np.deg2rad(MotionConfig().home_deg)
@@ -16,7 +16,7 @@ LOW_BOX = (slice(30, 45), slice(20, 40), 0.12)
 TALL_BOX = (slice(30, 45), slice(20, 40), 0.40)
 
 
-def plan(robot, wall, **settings):
+def plan(robot, wall, *, strokes=None, q0=HOME, **settings):
     arguments = {
         "kinematics": robot.kinematics,
         "limits": robot.limits,
@@ -25,7 +25,10 @@ def plan(robot, wall, **settings):
         "raster": RasterConfig(),
         "motion": MotionConfig(),
     }
-    return plan_program(wall, HOME, **arguments | settings)
+    arguments |= settings
+    if strokes is None:
+        return plan_program(wall, q0, **arguments)
+    return program_of(strokes, wall, q0, **arguments)
 
 
 def gun_in_tile(robot, program, time):
@@ -57,7 +60,7 @@ def test_strokes_run_at_constant_speed_square_and_in_place(robot, program):
         ideal = np.linspace(stroke.start_T, stroke.end_T, 400)
         # 0.1 % of the speed over a stroke of 2 m; the spline is good to some 10 µm.
         np.testing.assert_allclose(places[:, :2], ideal, atol=2e-4)
-        np.testing.assert_allclose(places[:, 2], 0.3, atol=2e-4)
+        np.testing.assert_allclose(places[:, 2], stroke.standoff, atol=2e-4)
         np.testing.assert_allclose(axes, [[0.0, 0.0, -1.0]] * 400, atol=1e-3)
         inside = slice(20, -20)
         speed = np.linalg.norm(np.gradient(places, time, axis=0), axis=1)[inside]
@@ -116,7 +119,7 @@ def test_strokes_beside_a_tall_box_are_cut_back_and_reported(robot, make_wall):
 
 
 def test_wall_out_of_reach_names_the_distances(robot, make_wall):
-    far = RigidTransform([0.4, 0.0, 0.0]) @ make_wall().X_WT
+    far = RigidTransform([0.7, 0.0, 0.0]) @ make_wall().X_WT
     with pytest.raises(ReachError, match=r"needs 1\.\d+ m .* the arm has 1\.57 m"):
         plan(robot, make_wall(X_WT=far))
 
@@ -147,3 +150,48 @@ def test_verification_finds_a_motion_that_is_too_fast(robot, program):
             space=robot.linker().space,
             what="rush",
         )
+
+
+def test_program_from_a_stroke_on_is_the_rest_of_the_program(robot, make_wall):
+    wall = make_wall((slice(60, 140), slice(0, 140), -0.1))
+    whole = plan(robot, wall)
+    # As a job is resumed that was stopped with a quarter of its third stroke done.
+    rest = plan(robot, wall, q0=HOME + 0.1, from_stroke=3.25)
+    assert len(rest.strokes) == len(whole.strokes) - 2
+    first = whole.strokes[2]
+    begin = 0.75 * first.start_T + 0.25 * first.end_T
+    np.testing.assert_allclose(rest.strokes[0].start_T, begin, atol=1e-9)
+    np.testing.assert_allclose(rest.strokes[0].end_T, first.end_T, atol=1e-9)
+    for dut, expected in zip(rest.strokes[1:], whole.strokes[3:], strict=True):
+        np.testing.assert_allclose(dut.start_T, expected.start_T, atol=1e-9)
+        np.testing.assert_allclose(dut.end_T, expected.end_T, atol=1e-9)
+
+
+def test_there_must_be_such_a_stroke(robot, make_wall):
+    with pytest.raises(ValueError, match="from_stroke must be 1 to"):
+        plan(robot, make_wall(), from_stroke=99.0)
+
+
+def test_strokes_that_differ_in_flow_alone_follow_without_a_gap(robot, make_wall):
+    parts = [
+        Stroke(np.array([1.0, a]), np.array([1.0, b]), 0.6, "body", 0, 0.3, flow)
+        for a, b, flow in ((0.4, 1.0, 1.0), (1.0, 1.2, 0.5))
+    ]
+    dut = plan(robot, make_wall(), strokes=parts)
+    opens = dut.motion.spray_on
+    assert opens[0, 1] == pytest.approx(opens[1, 0], abs=1e-9)
+    assert sorted(dut.motion.flow) == [0.5, 1.0]
+
+
+def test_a_little_out_of_reach_is_left_out(robot, make_wall):
+    tops = (1.9, 1.9, 1.9, 1.9, 2.5)
+    strokes = [
+        Stroke(np.array([x, 0.1]), np.array([x, top]), 0.6, "body", column, 0.3)
+        for column, (x, top) in enumerate(
+            zip(np.arange(5) * 0.2 + 0.6, tops, strict=True)
+        )
+    ]
+    dut = plan(robot, make_wall(), strokes=strokes)
+    assert len(dut.strokes) == 5
+    (left_out,) = (s for s in dut.skipped if s.reason == "out of the arm's reach")
+    assert max(left_out.stroke.start_T[1], left_out.stroke.end_T[1]) == 2.5
