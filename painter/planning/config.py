@@ -90,8 +90,12 @@ class RasterConfig:
         lead: Gun stays on this far beyond the edge of what is to be painted, m.
         keepout_margin: Grown around what must stay clean, m.
         min_stroke: Shorter strokes are dropped, m.
-        wall_share: The gun is on where at least this share of the fan's flow lands on
-            wall that is to be painted.
+        wall_share: Without cut-in, the gun is on where at least this share of the
+            fan's flow lands on wall that is to be painted.
+        cut_in: Fit the strokes to the film that they leave, with strokes nearer to the
+            wall beside edges; False = the raster alone.
+        cut_in_standoff: Nearest stand-off of such strokes, m; the fan is narrower by
+            as much. None are made where it is not below `standoff`.
     """
 
     speed: float = 0.6
@@ -101,10 +105,17 @@ class RasterConfig:
     keepout_margin: float = 0.0
     min_stroke: float = 0.03
     wall_share: float = 0.5
+    cut_in: bool = True
+    cut_in_standoff: float = 0.12
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
         check_positive("raster", speed=self.speed, standoff=self.standoff)
+        if not 0.08 <= self.cut_in_standoff < 1.0:
+            raise ValueError(
+                "raster.cut_in_standoff must be 0.08 to 1 m, got "
+                f"{self.cut_in_standoff!r}."
+            )
         for name in ("overlap_pitch", "lead", "keepout_margin", "min_stroke"):
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(

@@ -7,18 +7,16 @@ import numpy as np
 from pydrake.planning import CollisionChecker
 
 from painter.errors import CollisionError, ReachError
-from painter.planning.config import MotionConfig, RasterConfig, TipConfig
-from painter.planning.deposition import mean_film
 from painter.planning.blend import MovingState
+from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
 from painter.planning.joint_motion import Segment, chain, planning_limits, start_times
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.linker import Linker, end_q
 from painter.planning.obstacles import ClearSpace, segmentation_boxes
-from painter.planning.raster import plan_strokes
+from painter.planning.raster import plan_strokes, raster_film
 from painter.planning.reach import require_reach
 from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
-from painter.planning.stroke_lines import nominal_pitch
 from painter.planning.stroke_order import order_strokes
 from painter.planning.verify import verify_motion, verify_strokes
 from perception.values import FloatArray, WallSegmentation
@@ -76,7 +74,11 @@ def plan_program(
         MotionLimitError: The finished motion fails its verification.
     """
     wanted = plan_strokes(
-        np.asarray(segmentation.wall_mask), segmentation.cell, tip=tip, raster=raster
+        np.asarray(segmentation.wall_mask),
+        segmentation.cell,
+        tip=tip,
+        raster=raster,
+        height=np.asarray(segmentation.depth, dtype=np.float64),
     )
     return program_of(
         wanted,
@@ -199,8 +201,7 @@ def nominal_film(
 ) -> float:
     """Returns the wet film that the raster of a tile aims at, m."""
     width = segmentation.wall_mask.shape[1] * segmentation.cell
-    pitch = nominal_pitch(width, tip=tip, raster=raster)
-    return float(mean_film(tip, speed=raster.speed, pitch=pitch))
+    return raster_film(width, tip=tip, raster=raster)
 
 
 def _clear_strokes(

@@ -2,36 +2,58 @@
 
 The mount fixes the fan's long axis along T x, and on a plumb wall the arm cannot roll
 the gun: strokes run along T y only, on lines that `place_lines` spaces almost evenly
-over the tile. A stroke of another kind (a cut-in along an edge, a touch-up) is planned
-beside these and joins the same tuple.
+over the tile. Where a line would soil what stays clean it is left out; `find_cut_ins`
+fills in with narrower strokes from nearer to the wall, and `FilmFit` fits them all.
 """
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from painter.planning.config import RasterConfig, TipConfig
+from painter.planning.cut_in import find_cut_ins
+from painter.planning.deposition import mean_film
+from painter.planning.film_cost import FilmCost
+from painter.planning.film_fit import FilmFit, Span
+from painter.planning.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
-from painter.planning.stroke_lines import place_lines, wall_share
+from painter.planning.stroke_lines import nominal_pitch, place_lines, wall_share
 from perception.values import BoolArray, FloatArray
+
+# Of a line of the raster, before it is fitted: most of the flow that may land on what
+# stays clean, least that must land on wall to be painted, and the same where something
+# that stays clean is in the fan's reach.
+_MOST_SOILING = 0.03
+_LEAST_USE = 0.35
+_LEAST_USE_NARROW = 0.93
+_SAME_LINE = 0.002  # m
 
 
 def plan_strokes(
-    mask: BoolArray, cell: float, *, tip: TipConfig, raster: RasterConfig
+    mask: BoolArray,
+    cell: float,
+    *,
+    tip: TipConfig,
+    raster: RasterConfig,
+    height: FloatArray | None = None,
 ) -> tuple[Stroke, ...]:
     """Plans the strokes of a tile.
 
-    On every line the gun is on where at least `raster.wall_share` of the fan's flow
+    Without cut-in, the gun is on where at least `raster.wall_share` of the fan's flow
     lands on wall that is to be painted, and `raster.lead` beyond both ends of that.
+    With it, strokes of the same lines and narrower ones beside edges are fitted to the
+    film that they leave.
 
     Args:
         mask: (ny, nx) bool, True = to be painted, row 0 at the bottom of the tile.
         cell: Edge of a cell, m.
         tip: The spray tip, its fan's long axis along T x.
         raster: Settings of the raster.
+        height: (ny, nx) m, along T z, what stands out or lies back, NaN = nothing
+            seen; None = a plane. For cut-in.
 
     Returns:
-        Strokes in order of execution, up and down in turn from the left; none where
-        nothing is to be painted.
+        Strokes from the left; none where nothing is to be painted. Without cut-in they
+        go up and down in turn, else all upwards.
 
     Raises:
         ValueError: The mask is not a 2-D array of bool.
@@ -41,8 +63,84 @@ def plan_strokes(
             f"mask must be 2-D bool, got {mask.ndim}-D {mask.dtype} instead."
         )
     paintable = _keep_off(mask, round(raster.keepout_margin / cell, 6))
+    if not paintable.any():
+        return ()
     lines = place_lines(paintable, cell, tip=tip, raster=raster)
-    return _strokes_on(lines, paintable, cell, tip=tip, raster=raster)
+    if not raster.cut_in:
+        return _strokes_on(lines, paintable, cell, tip=tip, raster=raster)
+    nominal = raster_film(mask.shape[1] * cell, tip=tip, raster=raster)
+    site = Site.of_tile(paintable, cell, height)
+    model = FilmModel(site, tip=tip, speed=raster.speed, nominal=nominal)
+    fit = FilmFit(model, FilmCost.fine(site), raster=raster)
+    for span in _body_spans(lines, fit, model, raster=raster):
+        fit.add(span)
+    if raster.cut_in_standoff < raster.standoff:
+        find_cut_ins(fit, model, tip=tip, raster=raster)
+    fit.fit()
+    return _strokes(fit.spans, tip=tip, raster=raster)
+
+
+def raster_film(width: float, *, tip: TipConfig, raster: RasterConfig) -> float:
+    """Returns the wet film that the raster of a tile `width` m wide aims at, m."""
+    pitch = nominal_pitch(width, tip=tip, raster=raster)
+    return mean_film(tip, speed=raster.speed, pitch=pitch)
+
+
+def _body_spans(
+    lines: FloatArray, fit: FilmFit, model: FilmModel, *, raster: RasterConfig
+) -> list[Span]:
+    """Returns where the lines of the raster do no harm: the rest is for cut-in."""
+    site = model.site
+    spans: list[Span] = []
+    for x_line, room in zip(lines, fit.room(lines, raster.standoff).T, strict=True):
+        line = model.line(float(x_line), raster.standoff)
+        window = slice(*line.columns)
+        flow = line.film.sum(axis=1)
+        soiling = (line.film * site.clean[:, window]).sum(axis=1)
+        useful = (line.film * site.wanted[:, window]).sum(axis=1)
+        # Where the wall is narrower than the fan, narrow strokes do better.
+        narrow = site.clean[:, window].any(axis=1)
+        least = np.where(narrow, _LEAST_USE_NARROW, _LEAST_USE)
+        on = room & (soiling < _MOST_SOILING * flow) & (useful > least * flow)
+        for first, end in np.flatnonzero(
+            np.diff(on, prepend=False, append=False)
+        ).reshape(-1, 2):
+            low, high = ((row - site.border) * site.cell for row in (first, end))
+            if high - low >= raster.min_stroke:
+                spans.append(Span(float(x_line), low, high, raster.standoff, 1.0))
+    return spans
+
+
+def _strokes(
+    spans: list[Span], *, tip: TipConfig, raster: RasterConfig
+) -> tuple[Stroke, ...]:
+    """Returns fitted spans as strokes, upwards; the valve's shortest gap is kept."""
+    gap = max(raster.min_stroke, 2.0 * tip.valve_delay * raster.speed)
+    joined: list[Span] = []
+    for span in sorted(spans, key=lambda span: (round(span.x, 4), span.low)):
+        last = joined[-1] if joined else None
+        if (
+            last is not None
+            and abs(span.x - last.x) < _SAME_LINE
+            and (span.standoff, span.flow) == (last.standoff, last.flow)
+            and span.low - last.high < gap
+        ):
+            joined[-1] = last._replace(high=max(last.high, span.high))
+        else:
+            joined.append(span)
+    places = sorted({round(span.x, 3) for span in joined})
+    return tuple(
+        Stroke(
+            start_T=np.array([span.x, span.low]),
+            end_T=np.array([span.x, span.high]),
+            speed=raster.speed,
+            kind="body" if span.standoff == raster.standoff else "cut_in",
+            column=places.index(round(span.x, 3)),
+            standoff=span.standoff,
+            flow=min(span.flow, 1.0),
+        )
+        for span in joined
+    )
 
 
 def _keep_off(mask: BoolArray, margin: float) -> BoolArray:

@@ -16,7 +16,7 @@ A = 0.125
 
 
 def raster(**changes):
-    return RasterConfig(**({"lead": LEAD} | changes))
+    return RasterConfig(**({"lead": LEAD, "cut_in": False} | changes))
 
 
 def wall(*keepouts, width=2.0, height=2.0):

@@ -1,0 +1,179 @@
+"""Where to cut in: narrow strokes beside edges, found line by line.
+
+On every candidate line the best stretches to spray, and their flow, given all other
+strokes, follow from dynamic programming over the rows; the line that gains most is
+taken, and so on until none gains anything.
+"""
+
+import itertools
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+from painter.planning.config import RasterConfig, TipConfig
+from painter.planning.deposition import half_axes
+from painter.planning.film_cost import FilmCost, stroke_cost
+from painter.planning.film_fit import FilmFit, Span
+from painter.planning.film_model import FilmModel, Site
+from perception.values import BoolArray, FloatArray, IntArray
+
+_SPACING = 0.02  # m, between candidate lines.
+_ROUNDS = 10
+# Flow of candidates, as share of what keeps the film's thickness at their stand-off.
+_FLOWS = np.array([0.0, 0.6, 0.75, 0.9, 1.05, 1.25])
+_THIN = 0.9  # Film below which a line is worth looking at.
+_APART = 1.6  # Half fans between lines that are taken at once.
+_MOSTLY_EDGE = 4.0  # m of edge a m² of wall.
+_ROWS = 11
+_NEVER = 1e3  # m², cost of what cannot be.
+
+
+def find_cut_ins(
+    fit: FilmFit, model: FilmModel, *, tip: TipConfig, raster: RasterConfig
+) -> None:
+    """Adds strokes where the film of those that are there is thin.
+
+    Args:
+        fit: Gets the strokes.
+        model: Film on the site.
+        tip: The spray tip.
+        raster: `cut_in_standoff` is the nearest to the wall; where things stand out,
+            half way to `standoff` is tried as well.
+    """
+    site = model.site
+    near = raster.cut_in_standoff
+    standoffs = [near]
+    if (site.height > 0.2 * near).any():
+        standoffs.append(0.5 * (near + raster.standoff))
+    width = (site.wanted.shape[1] - 2 * site.border) * site.cell
+    places = np.linspace(0.0, width, round(width / _SPACING) + 1)[1:-1]
+    fan = round(2.0 * half_axes(tip, raster.standoff)[0] / site.cell)
+    beside = _worth_a_stroke(site, fan)
+    for _ in range(_ROUNDS):
+        found: list[tuple[float, float, list[Span]]] = []
+        for standoff in standoffs:
+            a, _ = half_axes(tip, standoff)
+            found += [
+                (gain, a, spans)
+                for gain, spans in _best_spans(
+                    fit, model, places, standoff, beside, raster
+                )
+            ]
+        taken: list[tuple[float, list[Span]]] = []
+        for gain, a, spans in sorted(found, key=lambda item: -item[0]):
+            if gain > 0.0 and not any(_meet(spans, a, *other) for other in taken):
+                taken.append((a, spans))
+                for span in spans:
+                    fit.add(span)
+        if not taken:
+            return
+
+
+def _worth_a_stroke(site: Site, fan: int) -> BoolArray:
+    """Returns the cells on which a cut-in is worth its time, (ny, nx).
+
+    A wall that is mostly edge is cut in along all of them. Else it is cells within a
+    fan's width, `fan` cells, and a few rows of what stays clean: at the tile's own
+    edges the raster alone does nearly as well.
+    """
+    steps = [np.diff(site.wanted.astype(np.int8), axis=axis) for axis in (0, 1)]
+    edge = sum(np.abs(step).sum() for step in steps) * site.cell
+    if edge > _MOSTLY_EDGE * site.wanted.sum() * site.cell**2:
+        return np.ones_like(site.clean)
+    return np.asarray(maximum_filter(site.clean, size=(_ROWS, 2 * fan + 1)))
+
+
+def _meet(spans: list[Span], a: float, other_a: float, others: list[Span]) -> bool:
+    """Returns whether spans of one line touch the film of another's."""
+    apart = abs(spans[0].x - others[0].x) >= _APART * 0.5 * (a + other_a)
+    return not apart and any(
+        one.low < other.high and other.low < one.high
+        for one in spans
+        for other in others
+    )
+
+
+def _best_spans(
+    fit: FilmFit,
+    model: FilmModel,
+    places: FloatArray,
+    standoff: float,
+    beside: BoolArray,
+    raster: RasterConfig,
+) -> list[tuple[float, list[Span]]]:
+    """Returns what each candidate line gains, m², and the spans that gain it."""
+    site = model.site
+    cost = FilmCost.coarse()
+    flows = _FLOWS * standoff / raster.standoff
+    tables, used = [], []
+    for x_line, room in zip(places, fit.room(places, standoff).T, strict=True):
+        line = model.line(float(x_line), standoff)
+        window = slice(*line.columns)
+        film, wanted = fit.film[:, window], site.wanted[:, window]
+        rows = (wanted & (film < _THIN) & beside[:, window]).any(axis=1)
+        if rows.sum() * site.cell < raster.min_stroke:
+            continue
+        table = np.zeros((rows.size, flows.size))
+        trial = film[rows] + flows[:, None, None] * line.film[rows]
+        cells = cost(trial, wanted[rows], site.clean[rows, window])
+        table[rows] = cells.sum(axis=2).T * site.cell**2
+        table[~rows, 1:] = _NEVER
+        table[~room, 1:] = _NEVER
+        table[:, 1:] += (stroke_cost(1.0) - stroke_cost(0.0)) * site.cell
+        tables.append(table)
+        used.append(float(x_line))
+    if not tables:
+        return []
+    levels, gains = _switch(np.stack(tables), stroke_cost(0.0))
+    result = []
+    for x_line, level, gain in zip(used, levels, gains, strict=True):
+        ends = np.flatnonzero(np.diff(level, prepend=0, append=0) != 0)
+        edges = [(a, b) for a, b in itertools.pairwise(ends) if level[a]]
+        spans = [
+            Span(
+                x_line,
+                (a - site.border) * site.cell,
+                (b - site.border) * site.cell,
+                standoff,
+                float(min(flows[level[a]], 1.0)),
+            )
+            for a, b in edges
+            if (b - a) * site.cell >= raster.min_stroke
+        ]
+        if spans:
+            result.append((float(gain), spans))
+    return result
+
+
+def _switch(cost: FloatArray, begun: float) -> tuple[IntArray, FloatArray]:
+    """Finds the cheapest level on each row if beginning to spray has its price.
+
+    Args:
+        cost: (n, rows, levels), level 0 is off; from one level on one goes to off or
+            stays.
+        begun: Price of going on.
+
+    Returns:
+        Levels (n, rows) and what they save against all off (n,).
+    """
+    count, rows, levels = cost.shape
+    best = np.full((count, levels), np.inf)
+    best[:, 0] = 0.0
+    from_off = np.zeros((rows, count, levels), dtype=bool)
+    off_from = np.zeros((rows, count), dtype=np.int64)
+    every = np.arange(count)
+    for row in range(rows):
+        off_from[row] = best.argmin(axis=1)
+        off = best[every, off_from[row]]
+        start = best[:, :1] + begun
+        from_off[row] = start < best
+        best = np.minimum(start, best) + cost[:, row]
+        best[:, 0] = off + cost[:, row, 0]
+    level = best.argmin(axis=1)
+    saved = cost[:, :, 0].sum(axis=1) - best[every, level]
+    path = np.zeros((count, rows), dtype=np.int64)
+    for row in range(rows - 1, -1, -1):
+        path[:, row] = level
+        begins = (level > 0) & from_off[row, every, level]
+        level = np.where(level == 0, off_from[row], np.where(begins, 0, level))
+    return path, saved

@@ -1,0 +1,156 @@
+"""Film with shading against ray casting; fitted strokes against the bounds asked."""
+
+import numpy as np
+import pytest
+
+from painter.planning.config import RasterConfig, TipConfig
+from painter.planning.cut_in import _switch
+from painter.planning.deposition import half_axes, mean_film, predicted_film
+from painter.planning.film_cost import FilmCost
+from painter.planning.film_model import FilmModel, Site
+from painter.planning.raster import plan_strokes, raster_film
+from painter.planning.spray_path import Stroke
+
+CELL = 0.01
+TIP = TipConfig()
+RASTER = RasterConfig()
+NOMINAL = raster_film(2.0, tip=TIP, raster=RASTER)
+
+
+def model(mask, height=None):
+    site = Site.of_tile(mask, CELL, height)
+    return FilmModel(site, tip=TIP, speed=RASTER.speed, nominal=NOMINAL)
+
+
+def wall(*keepouts):
+    """A 2 x 2 m wall with rectangles (x, y, width, height), m, that stay clean."""
+    mask = np.ones((200, 200), dtype=bool)
+    for x, y, w, h in keepouts:
+        rows = slice(round(y / CELL), round((y + h) / CELL))
+        mask[rows, round(x / CELL) : round((x + w) / CELL)] = False
+    return mask
+
+
+def figures(mask, strokes, height=None):
+    dut = model(mask, height)
+    film, site = dut.film(strokes), dut.site
+    on, off = film[site.wanted], film[site.clean]
+    return {
+        "coverage": np.mean(on >= 0.8),
+        "overspray": 1.0 - on.sum() / film.sum(),
+        "cv": on.std() / on.mean(),
+        "keepout": np.mean(off >= 0.1) if off.size else 0.0,
+    }
+
+
+def stroke(x, low, high, **changes):
+    return Stroke(
+        np.array([x, low]), np.array([x, high]), RASTER.speed, "body", 0, **changes
+    )
+
+
+def test_on_a_plane_it_is_the_closed_form():
+    dut = model(wall())
+    strokes = [stroke(0.7, 0.3, 1.2), stroke(1.1, 1.9, 0.2, standoff=0.15, flow=0.4)]
+    exact = predicted_film(strokes, dut.site.x, dut.site.y, tip=TIP) / NOMINAL
+    # Cells are means across x here, values at their centres there: 1 cm of 25 cm.
+    np.testing.assert_allclose(dut.film(strokes), exact, atol=0.012)
+
+
+@pytest.mark.parametrize("standoff", [0.12, 0.30])
+def test_no_paint_is_made_or_lost_on_steps(standoff):
+    height = np.zeros((200, 200))
+    height[:, 103:110] = 0.05
+    height[:, 90:97] = -0.10
+    mask = height == 0.0
+    line = model(mask, height).line(1.0, standoff)
+    landed = line.film.sum(axis=1) * CELL * NOMINAL
+    dose = TIP.flow * TIP.transfer_efficiency / RASTER.speed
+    np.testing.assert_allclose(landed, dose, rtol=1e-6)
+
+
+def test_a_board_shades_the_wall_behind_it():
+    """A ray over the edge of a board 5 cm high, from 30 cm, lands 1.2 times as far."""
+    height = np.zeros((200, 200))
+    height[:, 105:107] = 0.05  # x = 1.05 to 1.07 m, 5 to 7 cm from the spray axis.
+    line = model(height == 0.0, height).line(1.0, 0.30)
+    film = line.film[100]
+    column = line.columns[0] - model(wall()).site.border
+    shaded_to = 1.0 + 0.07 * 0.30 / 0.25
+    first_lit = int(np.floor(shaded_to / CELL)) - column
+    assert (film[107 - column : first_lit] == 0.0).all()
+    assert film[first_lit + 1] > 0.0
+
+
+def test_switching_is_paid_for_once_a_run():
+    # One line, off or one level: rows 1-3 gain 1 each, row 5 gains half.
+    gain = np.array([-0.1, 1.0, 1.0, 1.0, -0.2, 0.5])
+    cost = np.stack([np.zeros(6), -gain], axis=-1)[None]
+    levels, saved = _switch(cost, 0.4)
+    assert levels.tolist() == [[0, 1, 1, 1, 1, 1]]
+    assert saved == pytest.approx([3.0 - 0.2 + 0.5 - 0.4])
+    levels, saved = _switch(cost, 0.1)
+    assert levels.tolist() == [[0, 1, 1, 1, 0, 1]]
+    assert saved == pytest.approx([3.0 - 0.1 + 0.5 - 0.1])
+
+
+def test_cost_of_single_cells():
+    dut = FilmCost.fine(model(wall((0.5, 0.5, 1.0, 1.0))).site)
+    film, wanted = np.array([1.0, 0.5, 0.0, 0.0]), np.array([True, True, False, False])
+    cost = dut(film, wanted, ~wanted)
+    assert cost[0] == 0.0 and cost[1] > 1.0
+    assert cost[2:].tolist() == [0.0, 0.0]
+
+
+def test_blank_wall_keeps_to_the_raster():
+    mask = wall()
+    strokes = plan_strokes(mask, CELL, tip=TIP, raster=RASTER)
+    assert len(strokes) == 15
+    assert all(s.standoff == RASTER.standoff for s in strokes)
+    found = figures(mask, strokes)
+    assert found["coverage"] >= 0.97 and found["overspray"] <= 0.04
+
+
+def test_a_window_is_cut_in_within_the_bounds():
+    mask = wall((0.45, 0.60, 1.10, 1.00))
+    strokes = plan_strokes(mask, CELL, tip=TIP, raster=RASTER)
+    plain = plan_strokes(mask, CELL, tip=TIP, raster=RasterConfig(cut_in=False))
+    found, before = figures(mask, strokes), figures(mask, plain)
+    assert found["coverage"] >= 0.96 and found["overspray"] <= 0.05
+    assert found["cv"] <= 0.10 and found["keepout"] <= 0.03
+    assert before["keepout"] > 0.1 and before["coverage"] < found["coverage"]
+    near = [s for s in strokes if s.kind == "cut_in"]
+    assert near and all(s.standoff < 0.3 and s.flow < 1.0 for s in near)
+
+
+def test_small_cubes_stay_clean():
+    height = np.zeros((200, 200))
+    for x, y in ((40, 40), (120, 60), (80, 140)):
+        height[y : y + 10, x : x + 10] = 0.10
+    mask = height == 0.0
+    strokes = plan_strokes(mask, CELL, tip=TIP, raster=RASTER, height=height)
+    found = figures(mask, strokes, height)
+    assert found["coverage"] >= 0.95 and found["overspray"] <= 0.06
+    assert found["keepout"] <= 0.10
+    # The gun is 2.3 cm in radius and keeps 4 cm clear of what stands 10 cm out.
+    for s in strokes:
+        low, high = sorted((s.start_T[1], s.end_T[1]))
+        for x, y in ((0.40, 0.40), (1.20, 0.60), (0.80, 1.40)):
+            beside = x - 0.06 < s.start_T[0] < x + 0.16
+            if beside and low < y + 0.16 and high > y - 0.06:
+                assert s.standoff >= 0.14
+
+
+def test_nearer_and_weaker_leaves_a_narrower_film_as_thick():
+    near = model(wall()).film([stroke(1.0, 0.0, 2.0, standoff=0.12, flow=0.4)])
+    far = model(wall()).film([stroke(1.0, 0.0, 2.0)])
+    row = near.shape[0] // 2
+    assert near[row].max() == pytest.approx(far[row].max(), rel=0.03)  # Cells of 1 cm.
+    assert near[row].sum() == pytest.approx(0.4 * far[row].sum(), rel=1e-6)
+    assert half_axes(TIP, 0.12)[0] == pytest.approx(0.05)
+
+
+def test_nominal_film_is_flow_over_speed_and_pitch():
+    assert raster_film(2.0, tip=TIP, raster=RASTER) == mean_film(
+        TIP, speed=0.6, pitch=2.0 / 15
+    )
