@@ -6,41 +6,41 @@ stops all axes, closes the gun and latches the reason until `acknowledge`.
 """
 
 import logging
-from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from painter.canopen.bus_config import BusConfig
 from painter.canopen.cia402 import Command
 from painter.canopen.drive_client import DriveClient
-from painter.canopen.feedback import AxisStatus, Feedback, Phase, Statistics
+from painter.canopen.feedback import Feedback, Phase, Statistics
 from painter.canopen.frames import (
     ERROR_BUS_OFF,
     HEARTBEAT_BASE,
     SYNC_ID,
     Frame,
-    frame_time,
 )
 from painter.canopen.io_client import IoClient
 from painter.canopen.links import Link, LinkError
-from painter.canopen.node_client import OPERATIONAL, NodeClient, Script
-from painter.canopen.setpoints import Sample, Setpoint, SetpointBuffer, StopRamp
+from painter.canopen.node_client import OPERATIONAL, NodeClient, Script, together
+from painter.canopen.setpoints import (
+    Sample,
+    Setpoint,
+    SetpointBuffer,
+    SetpointGuard,
+    StopRamp,
+)
 from painter.canopen.units import (
     AXES,
-    JOINTS,
     FloatArray,
     axes_from_joints,
     joints_from_axes,
 )
+from painter.canopen.watch import LoadMeter, first_complaint
 from painter.errors import BusError
 
 _LOGGER = logging.getLogger(__name__)
 _REOPEN_EVERY = 0.25
-# A setpoint may be this far outside a joint's range: rounding of a planned path.
-_TOLERANCE = 1e-6
-# Share by which a step between two cycles may exceed the joint's greatest speed.
-_SPEED_MARGIN = 1.05
 
 
 class ArmBus:
@@ -67,9 +67,7 @@ class ArmBus:
         self.nodes: list[NodeClient] = [*self.drives, self.io]
         self._by_id = {node.node_id: node for node in self.nodes}
         self._joints = bus.joint_limits()
-        self._v_max = np.array([joint.v_max for joint in self._joints])
-        self._q_min = np.array([joint.q_min for joint in self._joints])
-        self._q_max = np.array([joint.q_max for joint in self._joints])
+        self._guard = SetpointGuard(self._joints, bus.timeouts.setpoint)
         self.phase = Phase.DOWN
         self.reason = ""
         self._buffer = SetpointBuffer()
@@ -83,8 +81,17 @@ class ArmBus:
         self._last_cycle: float | None = None
         self._now = 0.0
         self._counts = dict.fromkeys(("cycles", "overruns", "missing", "foreign"), 0)
-        self._traffic: deque[tuple[float, float]] = deque()
-        self._traffic_time = 0.0
+        self._meter = LoadMeter(bus.bitrate)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the way to the bus is lost."""
+        return self._is_lost
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no script (bring-up, homing, switching off) runs."""
+        return self._script is None
 
     # Commands.
 
@@ -146,7 +153,9 @@ class ArmBus:
         """Begins to switch off: ramp, brakes, power."""
         if self.phase in (Phase.ENABLED, Phase.STARTING):
             self.stop("switched off.")
+        ramp = self._ramp
         self._begin(self._switch_off())
+        self._ramp = ramp
 
     # Time.
 
@@ -208,14 +217,14 @@ class ArmBus:
             v=joints_from_axes(speeds),
             q_commanded=self._q.copy(),
             trigger=self.io.trigger,
-            axes=tuple(_axis_status(drive) for drive in self.drives),
+            axes=tuple(drive.status() for drive in self.drives),
             is_chain_closed=self.io.is_chain_closed,
             pressure=self.io.pressure,
             buffered=len(self._buffer),
             statistics=Statistics(
                 **self._counts,
                 retries=sum(node.sdo.retry_count for node in self.nodes),
-                load=self._load(),
+                load=self._meter.load(self._now),
             ),
         )
 
@@ -250,13 +259,13 @@ class ArmBus:
                     (config.restore, config.store) if config else (False, False)
                 )
                 scripts.append(node.bring_up(restore=restore, store=store))
-            yield from _together(scripts)
+            yield from together(scripts)
         for node in self.nodes:
             node.got_tpdo, node.missed, node.alarm = False, 0, None
             node.start()
         self._is_cyclic = True
         timeout = self._bus.timeouts.boot
-        yield from _together(
+        yield from together(
             node.wait(
                 lambda node=node: node.got_tpdo and node.nmt == OPERATIONAL,  # type: ignore[misc]
                 timeout,
@@ -266,7 +275,7 @@ class ArmBus:
         )
         if not self.io.is_chain_closed:
             raise BusError("e-stop: the chain is open.")
-        yield from _together([drive.enable() for drive in self.drives])
+        yield from together([drive.enable() for drive in self.drives])
         for drive in self.drives:
             yield from drive.home()
         self._q = self._actual()
@@ -275,8 +284,13 @@ class ArmBus:
 
     def _switch_off(self) -> Script:
         self.io.trigger = 0.0
+        if self._ramp is not None:
+            end = self._now + self._ramp.duration
+            while self._now < end:
+                yield
+            self._ramp = None
         if self._is_cyclic:
-            yield from _together([drive.disable() for drive in self.drives])
+            yield from together([drive.disable() for drive in self.drives])
         self._is_cyclic = False
         self.phase = Phase.DOWN
 
@@ -289,7 +303,7 @@ class ArmBus:
             return
         if self.phase != Phase.ENABLED:
             return
-        sample = self._buffer.sample(now)
+        cycle, sample = self._bus.cycle, self._buffer.sample(now)
         if sample is None:
             self._command(Sample(self._q, np.zeros(5), 0.0, 0.0))
             return
@@ -297,42 +311,16 @@ class ArmBus:
             # Late, but not yet too late: go on as the last setpoint said.
             moved = sample.q + sample.v * sample.lag
             sample = Sample(moved, sample.v, sample.trigger, sample.lag)
-        problem = self._objection(sample, now)
+        elapsed = cycle if self._last_cycle is None else now - self._last_cycle
+        problem = self._guard.objection(sample, self._q, max(elapsed, cycle))
         if problem:
             self.stop(problem)
             assert self._ramp is not None
             sample = self._ramp.sample(now)
         self._command(sample)
 
-    def _objection(self, sample: Sample, now: float) -> str | None:
-        """Returns why a sample must not be followed, or None."""
-        limit = self._bus.timeouts.setpoint
-        if sample.lag > limit and sample.is_active:
-            return (
-                f"setpoints: none for {sample.lag:.3f} s while moving or spraying "
-                f"(limit {limit:g} s)."
-            )
-        outside = np.maximum(self._q_min - sample.q, sample.q - self._q_max)
-        worst = int(np.argmax(outside))
-        if outside[worst] > _TOLERANCE:
-            joint = self._joints[worst]
-            return (
-                f"setpoints: {JOINTS[worst]} {sample.q[worst]:.4f} rad is not in "
-                f"{joint.q_min:g} to {joint.q_max:g} rad."
-            )
-        cycle = self._bus.cycle
-        elapsed = cycle if self._last_cycle is None else now - self._last_cycle
-        speed = np.abs(sample.q - self._q) / max(elapsed, cycle)
-        worst = int(np.argmax(speed / self._v_max))
-        if speed[worst] > _SPEED_MARGIN * self._v_max[worst]:
-            return (
-                f"setpoints: {JOINTS[worst]} would go {speed[worst]:.3f} rad/s, "
-                f"allowed are {self._v_max[worst]:g} rad/s."
-            )
-        return None
-
     def _command(self, sample: Sample) -> None:
-        self._q = np.clip(sample.q, self._q_min, self._q_max)
+        self._q = self._guard.clip(sample.q)
         self._v = sample.v
         self.io.trigger = sample.trigger
         axes = axes_from_joints(self._q)
@@ -372,25 +360,12 @@ class ArmBus:
                     self.stop(alarm, quick=True)
         if self.phase not in (Phase.ENABLED, Phase.STOPPED) or not self._is_cyclic:
             return
-        complaint = self._first_complaint(now)
+        held = self.phase == Phase.ENABLED or self._ramp is not None
+        complaint = first_complaint(
+            self._bus, self.drives, self.io, now=now, must_be_enabled=held
+        )
         if complaint is not None and (self.phase == Phase.ENABLED or self._ramp):
             self.stop(complaint, quick=True)
-
-    def _first_complaint(self, now: float) -> str | None:
-        timeouts = self._bus.timeouts
-        held = self.phase == Phase.ENABLED or self._ramp is not None
-        for node in self.nodes:
-            if now - node.heard > timeouts.heartbeat:
-                return f"{node.name}: no heartbeat for {timeouts.heartbeat:g} s."
-            if node.nmt != OPERATIONAL:
-                return f"{node.name}: left NMT state operational (is {node.nmt})."
-        for drive in self.drives:
-            if drive.missed * self._bus.cycle >= timeouts.tpdo:
-                return f"{drive.name}: no TPDO for {drive.missed} cycles."
-            complaint = drive.complaint(must_be_enabled=held)
-            if complaint:
-                return complaint
-        return self.io.complaint()
 
     def _is_sound(self, node: NodeClient) -> bool:
         """Whether a node can go on without being configured anew."""
@@ -401,7 +376,7 @@ class ArmBus:
     # The link.
 
     def _take(self, frame: Frame, now: float) -> None:
-        self._note_traffic(frame)
+        self._meter.note(frame, self._now)
         if frame.is_error:
             if frame.cob_id & ERROR_BUS_OFF:
                 self._lose("bus-off: the CAN controller gave up.")
@@ -415,7 +390,7 @@ class ArmBus:
     def _send(self, frame: Frame) -> None:
         if self._is_lost:
             return
-        self._note_traffic(frame)
+        self._meter.note(frame, self._now)
         try:
             self._link.send(frame)
         except LinkError as error:
@@ -440,38 +415,3 @@ class ArmBus:
         for node in self.nodes:
             node.heard = now
             node.missed = 0
-
-    def _note_traffic(self, frame: Frame) -> None:
-        took = frame_time(len(frame.data), self._bus.bitrate)
-        self._traffic.append((self._now, took))
-        self._traffic_time += took
-        while self._traffic and self._now - self._traffic[0][0] > 1.0:
-            self._traffic_time -= self._traffic.popleft()[1]
-
-    def _load(self) -> float:
-        if not self._traffic:
-            return 0.0
-        return self._traffic_time / max(self._now - self._traffic[0][0], 0.1)
-
-
-def _together(scripts: Iterable[Script]) -> Script:
-    """Runs scripts side by side until all have ended; the first error ends all."""
-    running = list(scripts)
-    while running:
-        for script in list(running):
-            try:
-                next(script)
-            except StopIteration:
-                running.remove(script)
-        if running:
-            yield
-
-
-def _axis_status(drive: DriveClient) -> AxisStatus:
-    return AxisStatus(
-        name=drive.name,
-        state="UNKNOWN" if drive.state is None else drive.state.value,
-        code=drive.emcy,
-        following_error=drive.following_error / drive.units.counts_per_rad,
-        statusword=drive.statusword,
-    )

@@ -13,8 +13,9 @@ from painter.canopen.cia402 import (
     state_of,
 )
 from painter.canopen.device import Mode
+from painter.canopen.feedback import AxisStatus
 from painter.canopen.frames import RPDO_BASES, TPDO_BASES, Frame
-from painter.canopen.node_client import OPERATIONAL, NodeClient, Script
+from painter.canopen.node_client import NodeClient, Script
 from painter.canopen.od_config import plan_drive
 from painter.canopen.od_types import pack
 from painter.canopen.units import DriveLimits
@@ -101,6 +102,16 @@ class DriveClient(NodeClient):
         data += self.target.to_bytes(4, "little", signed=True)
         return Frame(RPDO_BASES[0] + self.node_id, data)
 
+    def status(self) -> AxisStatus:
+        """Returns the drive's state for the feedback."""
+        return AxisStatus(
+            name=self.name,
+            state="UNKNOWN" if self.state is None else self.state.value,
+            code=self.emcy,
+            following_error=self.following_error / self.units.counts_per_rad,
+            statusword=self.statusword,
+        )
+
     def complaint(self, *, must_be_enabled: bool) -> str | None:
         """Returns what in the statusword must stop the arm, or None."""
         if self.state in (State.FAULT, State.FAULT_REACTION):
@@ -140,10 +151,6 @@ class DriveClient(NodeClient):
                     f"{self.name}: mode {self.mode.name} is not supported: 6502h is "
                     f"{supported:X}h."
                 )
-
-    def is_operational(self) -> bool:
-        """Whether heartbeat and a statusword since the start say so."""
-        return self.nmt == OPERATIONAL and self.got_tpdo
 
     def enable(self) -> Script:
         """Steps up to OPERATION ENABLED; the target is the actual position until then.

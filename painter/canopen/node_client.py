@@ -1,7 +1,7 @@
 """The master's view of one node: boot-up, identity, heartbeat, emergencies."""
 
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 
 from painter.canopen.bus_config import Identity, Timeouts
 from painter.canopen.codes import emcy_text
@@ -204,3 +204,16 @@ class NodeClient:
         self.emcy = code
         if code:
             self.alarm = f"{self.name}: {self.fault_text()}."
+
+
+def together(scripts: Iterable[Script]) -> Script:
+    """Runs scripts side by side until all have ended; the first error ends all."""
+    running = list(scripts)
+    while running:
+        for script in list(running):
+            try:
+                next(script)
+            except StopIteration:
+                running.remove(script)
+        if running:
+            yield

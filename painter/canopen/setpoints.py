@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from painter.canopen.units import FloatArray, JointLimits
+from painter.canopen.units import JOINTS, FloatArray, JointLimits
 
 _MOST = 4096
 _STILL = 1e-6
+# A setpoint may be this far outside a joint's range: rounding of a planned path.
+_TOLERANCE = 1e-6
+# Share by which a step between two cycles may exceed the joint's greatest speed.
+_SPEED_MARGIN = 1.05
 
 
 @dataclass(frozen=True)
@@ -149,3 +153,52 @@ class StopRamp:
         q = self._q + self._v * (t - t * t / (2.0 * self.duration))
         v = self._v * (1.0 - t / self.duration)
         return Sample(np.clip(q, self._low, self._high), v, 0.0, 0.0)
+
+
+class SetpointGuard:
+    """Says which samples must not be followed."""
+
+    def __init__(self, joints: Sequence[JointLimits], timeout: float) -> None:
+        """Creates the guard.
+
+        Args:
+            joints: Limits in the order of `JOINTS`.
+            timeout: Time without a setpoint while moving or spraying, s.
+        """
+        self._timeout = timeout
+        self._low = np.array([joint.q_min for joint in joints])
+        self._high = np.array([joint.q_max for joint in joints])
+        self._v_max = np.array([joint.v_max for joint in joints])
+
+    def clip(self, q: FloatArray) -> FloatArray:
+        """Returns positions within the joints' ranges."""
+        return np.clip(q, self._low, self._high)
+
+    def objection(self, sample: Sample, q: FloatArray, elapsed: float) -> str | None:
+        """Returns why a sample must not be followed, or None.
+
+        Args:
+            sample: The command.
+            q: (5,) command before, rad.
+            elapsed: Time since then, s.
+        """
+        if sample.lag > self._timeout and sample.is_active:
+            return (
+                f"setpoints: none for {sample.lag:.3f} s while moving or spraying "
+                f"(limit {self._timeout:g} s)."
+            )
+        outside = np.maximum(self._low - sample.q, sample.q - self._high)
+        worst = int(np.argmax(outside))
+        if outside[worst] > _TOLERANCE:
+            return (
+                f"setpoints: {JOINTS[worst]} {sample.q[worst]:.4f} rad is not in "
+                f"{self._low[worst]:g} to {self._high[worst]:g} rad."
+            )
+        speed = np.abs(sample.q - q) / elapsed
+        worst = int(np.argmax(speed / self._v_max))
+        if speed[worst] > _SPEED_MARGIN * self._v_max[worst]:
+            return (
+                f"setpoints: {JOINTS[worst]} would go {speed[worst]:.3f} rad/s, "
+                f"allowed are {self._v_max[worst]:g} rad/s."
+            )
+        return None

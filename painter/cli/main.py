@@ -20,7 +20,9 @@ from perception.errors import PerceptionError
 COMMANDS = {
     "simulate": "Simulate the whole paint cycle in Drake.",
     "segment": "Segment a recorded cloud or depth image into wall and rest.",
+    "map": "Map a recorded RGB-D sequence: poses and one surface.",
     "plan": "Plan the paint program of a segmented wall.",
+    "drives": "Run simulated CiA 402 drives on a CAN interface.",
     "report": "Rebuild the report page of a run.",
 }
 
