@@ -1,0 +1,109 @@
+"""Touch-up mends what is thin and leaves alone what is not."""
+
+import numpy as np
+import pytest
+
+from painter.planning.config import MotionConfig, RasterConfig, TipConfig
+from painter.planning.deposition import best_pitch, mean_film, predicted_film
+from painter.planning.program import program_of
+from painter.planning.spray_path import Stroke
+from painter.planning.tile import cell_centres
+from painter.planning.touch_up import marked_cells, touch_up_strokes
+
+TIP, RASTER = TipConfig(), RasterConfig()
+SHAPE, CELL = (200, 200), 0.01
+WALL = np.ones(SHAPE, dtype=bool)
+PITCH = best_pitch(TIP, RASTER.standoff)
+NOMINAL = mean_film(TIP, speed=RASTER.speed, pitch=PITCH)
+PATCH = (slice(90, 110), slice(90, 110))  # 20 x 20 cm.
+
+
+def even_film():
+    """A raster that reaches beyond the tile on all sides."""
+    lines = np.arange(-1, 17) * PITCH
+    strokes = [
+        Stroke(np.array([x, -0.2]), np.array([x, 2.2]), 0.6, "body", 0) for x in lines
+    ]
+    return predicted_film(strokes, *cell_centres(SHAPE, CELL), tip=TIP)
+
+
+def mend(film, wanted=WALL):
+    strokes = touch_up_strokes(
+        film, wanted, CELL, nominal=NOMINAL, tip=TIP, raster=RASTER
+    )
+    return strokes, film + predicted_film(
+        sorted(strokes, key=lambda s: s.start_T[0]),
+        *cell_centres(SHAPE, CELL),
+        tip=TIP,
+    )
+
+
+def test_even_film_needs_no_touch_up():
+    assert mend(even_film())[0] == ()
+
+
+@pytest.mark.parametrize("corner", [(90, 90), (13, 57), (150, 101)])
+def test_cleared_patch_is_mended_without_doubling_film_elsewhere(corner):
+    film = even_film()
+    row, column = corner
+    patch = (slice(row, row + 20), slice(column, column + 20))
+    film[patch] = 0.0
+    strokes, mended = mend(film)
+    assert strokes
+    assert np.mean(mended[patch] >= 0.8 * NOMINAL) >= 0.95
+    assert np.mean(mended >= 1.5 * NOMINAL) <= 0.01
+    away = np.ones(SHAPE, dtype=bool)
+    away[row - 6 : row + 26, column - 6 : column + 26] = False
+    np.testing.assert_array_equal(mended[away], film[away])
+
+
+def test_film_half_gone_is_filled_by_half():
+    film = even_film()
+    film[PATCH] *= 0.5
+    _, mended = mend(film)
+    assert mended[PATCH].mean() == pytest.approx(NOMINAL, rel=0.1)
+
+
+def test_large_gap_is_filled_with_the_wide_fan():
+    film = even_film()
+    film[:, :120] = 0.0
+    strokes, mended = mend(film)
+    assert {stroke.standoff for stroke in strokes} == {RASTER.standoff}
+    assert np.mean(mended[:, 12:110] >= 0.8 * NOMINAL) > 0.97
+
+
+def test_what_stays_clean_and_soft_edges_are_no_reason_to_spray():
+    film = even_film()
+    wanted = WALL.copy()
+    wanted[60:120, 60:120] = False
+    film[60:120, 60:120] = 0.0  # A window.
+    film[50:150, 58:60] *= 0.6  # Beside it, a strip of 2 cm.
+    assert mend(film, wanted)[0] == ()
+
+
+def test_mark_is_a_rectangle_or_a_polygon():
+    box = marked_cells([[0.5, 0.4], [0.7, 0.6]], SHAPE, CELL)
+    assert box.sum() == 400
+    assert box[40:60, 50:70].all()
+    triangle = marked_cells([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], SHAPE, CELL)
+    assert triangle.sum() * CELL**2 == pytest.approx(0.5, abs=0.01)
+    with pytest.raises(ValueError, match="2 or more corners"):
+        marked_cells([[0.5, 0.4]], SHAPE, CELL)
+
+
+def test_touch_up_is_a_program_that_the_arm_can_do(robot, make_wall):
+    film = even_film()
+    film[PATCH] = 0.0
+    strokes, _ = mend(film)
+    dut = program_of(
+        strokes,
+        make_wall(),
+        np.deg2rad(MotionConfig().home_deg),
+        tip=TIP,
+        raster=RASTER,
+        motion=MotionConfig(),
+        **vars(robot),
+    )
+    assert len(dut.strokes) == len(strokes)
+    assert dut.skipped == ()
+    assert sorted(dut.motion.flow) == sorted(stroke.flow for stroke in strokes)
