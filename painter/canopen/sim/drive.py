@@ -66,6 +66,8 @@ class SimDrive(SimNode):
         self.store.fix(0x608F, 1, round(units.counts_per_turn))
         if units.velocity == VelocityUnit.RPM:
             self.store.fix(0x60A9, 0, 0x00B44700)
+        if not self.store.number(0x1000):
+            self.store.fix(0x1000, 0, 0x00020192)  # A servo drive; not in every EDS.
         self.store.hooks[0x6060] = self._check_mode
         self.on_reset()
 
@@ -350,7 +352,8 @@ class SimDrive(SimNode):
     def _home(self, run: HomingRun, dt: float) -> None:
         speed = self.store.number(0x6099, 1, 1000) * self._velocity_scale
         run.step(self.demand, speed, self._ramp(0x609A), dt)
-        if run.is_done:
+        settled = abs(self.demand.position - self.position) < 1.0
+        if run.is_done and settled:
             # Object 607Ch: position of the drive's zero as seen from home.
             self._offset = self.store.number(0x607C) - self.motor.position
             self._hold_here()
