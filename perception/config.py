@@ -74,6 +74,8 @@ class SegmentationConfig:
     Attributes:
         neighbors: Neighbours of the statistical filter, k.
         std_multiplier: Its threshold in standard deviations, alpha.
+        fast_filter: Let the filter prove dense places inside by bounds and estimate its
+            threshold from a sample; see `statistical_filter`.
         distance_threshold: RANSAC inlier distance, m.
         stop_fraction: RANSAC stops when fewer points than this share remain.
         max_planes: RANSAC stops after so many planes.
@@ -87,6 +89,7 @@ class SegmentationConfig:
 
     neighbors: int = 50
     std_multiplier: float = 3.5
+    fast_filter: bool = False
     distance_threshold: float = 0.03
     stop_fraction: float = 0.005
     max_planes: int = 20
@@ -99,7 +102,9 @@ class SegmentationConfig:
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
-        check_positive("segmentation", **dataclasses.asdict(self))
+        numbers = dataclasses.asdict(self)
+        del numbers["fast_filter"]
+        check_positive("segmentation", **numbers)
 
 
 @dataclasses.dataclass(kw_only=True)

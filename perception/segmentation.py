@@ -135,7 +135,10 @@ def find_planes(
     config.validate()
     p_WQs = p_WQs[:, finite_points(p_WQs)]
     kept = statistical_filter(
-        p_WQs, neighbors=config.neighbors, std_multiplier=config.std_multiplier
+        p_WQs,
+        neighbors=config.neighbors,
+        std_multiplier=config.std_multiplier,
+        fast=config.fast_filter,
     )
     labels = np.zeros(kept.size, dtype=np.int64)
     labels[kept], planes = segment_planes(
