@@ -27,7 +27,7 @@ from perception.values import WallSegmentation
 
 DATA = Path(os.environ.get("PAINTER_DATA", "../shared/data")) / "real"
 LEAST_WALL, MOST_WALL = 0.9, 0.1  # Of a rectangle that is wall; that is not.
-FACADE_MEAN = 0.92
+HIDDEN = 0.05  # m behind what the gun meets first.
 HEAD = "| recording | correct result | found | |\n| --- | --- | --- | --- |"
 
 
@@ -85,22 +85,25 @@ def _cells(low: float, high: float, cell: float) -> Any:
 def precision_recall(result: WallSegmentation, case: Case) -> tuple[float, float]:
     """Compares points with labels by people: "wall" is what has a cell of the mask.
 
-    Of the points that share a cell those more than 5 cm behind its foremost are hidden
-    from the gun and are not counted as called wall.
+    What is over 5 cm behind another point of its cell is hidden from the gun, which is
+    square to the wall where the sensor looked at a slant, and is left out.
     """
     points = read_cloud(DATA / case.name).p_WQs
     labels = read_fields(DATA / case.name)["label"].ravel()
-    finite = np.isfinite(points).all(axis=0)
-    truth = np.isin(labels[finite], case.labels)
-    p_TQs = result.X_WT.inverse() @ points[:, finite]
-    columns, rows = np.floor(p_TQs[:2] / result.cell).astype(int)
+    p_TQs = result.X_WT.inverse() @ points
     ny, nx = result.wall_mask.shape
-    inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
-    said = np.zeros(truth.size, dtype=bool)
-    said[inside] = result.wall_mask[rows[inside], columns[inside]]
+    with np.errstate(invalid="ignore"):
+        columns, rows = np.floor(p_TQs[:2] / result.cell).astype(int)
+    finite = np.isfinite(points).all(axis=0)
+    inside = finite & (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
+    cells = (rows[inside], columns[inside])
     front = np.full((ny, nx), -np.inf)
-    np.maximum.at(front, (rows[inside], columns[inside]), p_TQs[2, inside])
-    said[inside] &= p_TQs[2, inside] >= front[rows[inside], columns[inside]] - 0.05
+    np.maximum.at(front, cells, p_TQs[2, inside])
+    counted, said = finite.copy(), np.zeros(labels.size, dtype=bool)
+    counted[inside] = p_TQs[2, inside] >= front[cells] - HIDDEN
+    said[inside] = result.wall_mask[cells]
+    truth = np.isin(labels, case.labels) & counted
+    said &= counted
     hits = np.count_nonzero(said & truth)
     return hits / np.count_nonzero(said), hits / np.count_nonzero(truth)
 

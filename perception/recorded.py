@@ -12,6 +12,7 @@ from perception.errors import NoWallError
 from perception.planes import fit_plane
 from perception.recorded_tile import (
     ViewSide,
+    clear_feet,
     close_gaps,
     fitting_cell,
     robust_extent,
@@ -138,6 +139,7 @@ def segment_recorded(
     wall = wall_on_plane(plane, X_WT, **tile, total=found.kept_count)
     config = dataclasses.replace(config, cell=cell, distance_threshold=limit)
     steps = segment_tile(found, wall, number + 1, **tile, config=config)
+    steps = clear_feet(steps, limit=limit)
     area = 0.0
     if set_back > 0.0:
         steps, area = set_back_wall(steps, set_back=set_back)
