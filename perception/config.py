@@ -85,6 +85,9 @@ class SegmentationConfig:
         wall_distance_tolerance: How far the wall may be from the expected one, m.
         wall_angle_tolerance_deg: How far its normal may be from the expected one.
         min_wall_share: Share of the points that the wall's plane has at least.
+        min_step: Lower steps against the wall's own surface are painted over, m.
+        step_significance: So many standard deviations of the residual make a step.
+        min_object_area: Smaller parts off the wall's surface count as wall, m².
     """
 
     neighbors: int = 50
@@ -99,6 +102,9 @@ class SegmentationConfig:
     wall_distance_tolerance: float = 0.15
     wall_angle_tolerance_deg: float = 10.0
     min_wall_share: float = 0.1
+    min_step: float = 0.005
+    step_significance: float = 5.0
+    min_object_area: float = 0.0009
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""

@@ -15,3 +15,11 @@ class CloudReadError(PerceptionError):
 
 class NoWallError(PerceptionError):
     """There is no wall where one is expected, or not enough of one."""
+
+
+class ObliqueWallError(NoWallError):
+    """The wall is turned too far from where it is expected to be worked on."""
+
+
+class AmbiguousWallError(NoWallError):
+    """Two planes are equally good walls; the job must say which one is meant."""

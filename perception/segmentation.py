@@ -10,6 +10,7 @@ from perception.errors import NoWallError
 from perception.filters import statistical_filter
 from perception.label_grid import NOTHING, LabelGrid, label_grid, visible_points
 from perception.planes import Plane, segment_planes
+from perception.refine import refine_segmentation
 from perception.regions import (
     absorb_tiny_regions,
     adjacent_regions,
@@ -84,8 +85,14 @@ def segment_wall(
     height: float,
     config: SegmentationConfig,
     seed: int,
+    counts: IntArray | None = None,
+    variances: FloatArray | None = None,
+    up_W: FloatArray | None = None,
 ) -> WallSegmentation:
     """Parts the wall tile in front of the robot into wall and other regions.
+
+    The paper's steps find the wall and part the tile; then the mask is drawn anew by
+    fine steps (see `refine_segmentation`).
 
     Source: Tadic et al., "Painting Robot with RealSense D435", 2021, section 4.4.
 
@@ -96,6 +103,10 @@ def segment_wall(
         height: Of the tile, m, along T y.
         config: Thresholds of the steps.
         seed: Of RANSAC's random triples; same cloud and seed, same result.
+        counts: (N,) measurements fused into each point, where that is known.
+        variances: (N,) m², of one measurement of each point along the wall's normal.
+        up_W: (3,) unit, against gravity: what lies level is no wall; see
+            `choose_plane`.
 
     Returns:
         The segmentation, on the tile frame of the wall as found. Depth is NaN wherever
@@ -108,12 +119,27 @@ def segment_wall(
     found = find_planes(p_WQs, config=config, seed=seed)
     size = {"width": width, "height": height}
     number = choose_plane(
-        found.planes, X_WT_expected, **size, total=found.kept_count, config=config
+        found.planes,
+        X_WT_expected,
+        width=width,
+        height=height,
+        total=found.kept_count,
+        config=config,
+        up_W=up_W,
     )
     wall = wall_on_plane(
         found.planes[number], X_WT_expected, **size, total=found.kept_count
     )
-    return segment_tile(found, wall, number + 1, **size, config=config).segmentation
+    coarse = segment_tile(found, wall, number + 1, **size, config=config).segmentation
+    used = np.flatnonzero(np.all(np.isfinite(p_WQs), axis=0))[found.kept]
+    return refine_segmentation(
+        coarse,
+        wall.X_WT.inverse() @ found.p_WQs[:, found.kept],
+        counts=None if counts is None else counts[used],
+        variances=None if variances is None else variances[used],
+        config=config,
+        seed=seed,
+    )
 
 
 def find_planes(

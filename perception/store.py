@@ -12,6 +12,7 @@ from perception.errors import CloudReadError
 from perception.values import BoolArray, FloatArray, WallSegmentation
 
 _FIELDS = ("labels", "depth", "wall_mask", "X_WT", "cell")
+_EXTRAS = ("surface", "normals", "confidence", "reason")  # Where they were made.
 
 
 def save_segmentation(path: Path, segmentation: WallSegmentation) -> None:
@@ -20,9 +21,12 @@ def save_segmentation(path: Path, segmentation: WallSegmentation) -> None:
     Args:
         path: File to write, `segmentation.npz`: `labels` (ny, nx) uint16, `depth`
             (ny, nx) float32 m, `wall_mask` (ny, nx) bool, `X_WT` (4, 4), `cell` m; row
-            0 at the bottom.
+            0 at the bottom; and, where fine steps drew the mask, `surface` (ny, nx)
+            float32 m, `normals` (ny, nx, 3) float32, `confidence` (ny, nx) float32 and
+            `reason` (ny, nx) uint8. Openings are not kept.
         segmentation: What to write.
     """
+    extras = {name: getattr(segmentation, name) for name in _EXTRAS}
     np.savez_compressed(
         path,
         labels=segmentation.labels,
@@ -30,6 +34,7 @@ def save_segmentation(path: Path, segmentation: WallSegmentation) -> None:
         wall_mask=segmentation.wall_mask,
         X_WT=segmentation.X_WT.GetAsMatrix4(),
         cell=np.float64(segmentation.cell),
+        **{name: grid for name, grid in extras.items() if grid is not None},
     )
 
 
@@ -55,6 +60,7 @@ def load_segmentation(path: Path) -> WallSegmentation:
         if missing:
             raise CloudReadError(f"{path}: no segmentation: {missing[0]} is missing.")
         content = {name: file[name] for name in _FIELDS}
+        extras = {name: file[name] for name in _EXTRAS if name in file.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise CloudReadError(f"{path}: no segmentation: {error}") from error
     labels = content["labels"]
@@ -63,6 +69,11 @@ def load_segmentation(path: Path) -> WallSegmentation:
             raise CloudReadError(
                 f"{path}: {name} has shape {content[name].shape}, "
                 f"labels {labels.shape}; both must be (ny, nx)."
+            )
+    for name, grid in extras.items():
+        if grid.shape[:2] != labels.shape:
+            raise CloudReadError(
+                f"{path}: {name} has shape {grid.shape}, labels {labels.shape}."
             )
     matrix = content["X_WT"]
     if matrix.shape != (4, 4) or not _is_rotation(matrix[:3, :3]):
@@ -76,6 +87,7 @@ def load_segmentation(path: Path) -> WallSegmentation:
         wall_mask=content["wall_mask"].astype(np.bool_),
         X_WT=RigidTransform(matrix),
         cell=cell,
+        **extras,
     )
 
 

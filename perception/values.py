@@ -85,6 +85,26 @@ class Wall(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False)
+class Opening(FrozenValue):
+    """A window, door or niche in the wall.
+
+    Attributes:
+        kind: "rectangle" or, where none fits, "contour".
+        p_TVs: (2, n) m, x and y in T of its corners, counter-clockwise.
+        area: Of its cells, m².
+        depth: Median depth of what is recessed in it, m along T z against the wall's
+            surface; NaN if nothing but glass was seen.
+        glass_share: Share of its cells that are glass.
+    """
+
+    kind: str
+    p_TVs: FloatArray
+    area: float
+    depth: float
+    glass_share: float
+
+
+@dataclass(frozen=True, eq=False)
 class WallSegmentation(FrozenValue):
     """Labelled grid over the tile; row 0 is the bottom row, column 0 the left one.
 
@@ -94,6 +114,13 @@ class WallSegmentation(FrozenValue):
         wall_mask: (ny, nx) bool; True = wall, to be painted.
         X_WT: Tile frame T in W (see `Wall`).
         cell: Edge of a cell, m.
+        surface: (ny, nx) float32, m along T z: the wall's own surface, bulge and twist
+            included, also where things hide it. None where the mask comes from the
+            paper's steps alone; so are the fields below.
+        normals: (ny, nx, 3) float32, unit, in T: the normals of that surface.
+        confidence: (ny, nx) float32, 0 to 1: how sure each cell of the mask is.
+        reason: (ny, nx) uint8, values of `perception.unseen.Reason`.
+        openings: Windows, doors and niches, the largest first.
     """
 
     labels: npt.NDArray[np.uint16]
@@ -101,3 +128,8 @@ class WallSegmentation(FrozenValue):
     wall_mask: BoolArray
     X_WT: RigidTransform
     cell: float
+    surface: npt.NDArray[np.float32] | None = None
+    normals: npt.NDArray[np.float32] | None = None
+    confidence: npt.NDArray[np.float32] | None = None
+    reason: npt.NDArray[np.uint8] | None = None
+    openings: tuple[Opening, ...] = ()

@@ -7,12 +7,14 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from perception.config import SegmentationConfig
-from perception.errors import NoWallError
+from perception.errors import AmbiguousWallError, NoWallError, ObliqueWallError
 from perception.planes import Plane, segment_planes
 from perception.values import BoolArray, FloatArray, Wall
 
 MIN_POINTS = 100  # Fewer are a stray return, not a surface.
 _STEEPEST = math.radians(80.0)  # Beyond, the centre line runs along the plane.
+_LEVEL = math.cos(math.radians(30.0))  # Planes closer to level are floors.
+_EQUAL = 0.8  # A plane worth this share of the best is as good.
 
 
 def find_wall(
@@ -26,8 +28,8 @@ def find_wall(
 ) -> Wall:
     """Finds the wall near where it is expected and lays the tile on it.
 
-    The wall is the largest plane within the configured distance and angle of the
-    expected one.
+    The wall is the best plane within the configured distance and angle of the expected
+    one (see `choose_plane`).
 
     Args:
         p_WQs: (3, N) m, in W; non-finite points are dropped.
@@ -123,8 +125,13 @@ def choose_plane(
     height: float,
     total: int,
     config: SegmentationConfig,
+    up_W: FloatArray | None = None,
 ) -> int:
     """Chooses the plane that is the wall.
+
+    A door may fill most of a picture; so the points of a plane count less the farther
+    it lies from where the wall is expected: half the distance tolerance is taken as one
+    standard deviation.
 
     Args:
         planes: In W.
@@ -133,40 +140,71 @@ def choose_plane(
         height: Of the tile, m.
         total: Points of the cloud.
         config: Tolerances.
+        up_W: (3,) unit, against gravity; planes nearly level are floor or ceiling and
+            no wall. Not looked at if left out.
 
     Returns:
-        Index of the largest plane within the tolerances.
+        Index of the best plane within the tolerances.
 
     Raises:
+        AmbiguousWallError: Two planes apart from each other are about equally good.
+        ObliqueWallError: The largest plane is in its place but turned too far.
         NoWallError: There is none; names the closest misses.
     """
     limit = config.wall_distance_tolerance
     limit_angle = math.radians(config.wall_angle_tolerance_deg)
     least = config.min_wall_share * total
-    offs = [
-        deviation(plane, X_WT_expected, width=width, height=height) for plane in planes
+    upright = [
+        plane
+        for plane in planes
+        if up_W is None or abs(float(plane.normal @ up_W)) < _LEVEL
     ]
+    offs = {
+        id(plane): deviation(plane, X_WT_expected, width=width, height=height)
+        for plane in planes
+    }
+
+    def worth(plane: Plane) -> float:
+        return plane.count * math.exp(-2.0 * (offs[id(plane)][0] / limit) ** 2)
+
     good = [
-        number
-        for number, (plane, (distance, angle)) in enumerate(
-            zip(planes, offs, strict=True)
-        )
-        if abs(distance) <= limit and angle <= limit_angle and plane.count >= least
+        plane
+        for plane in upright
+        if abs(offs[id(plane)][0]) <= limit
+        and offs[id(plane)][1] <= limit_angle
+        and plane.count >= least
     ]
+    good.sort(key=worth, reverse=True)
+    for other in good[1:]:
+        apart = abs(offs[id(good[0])][0] - offs[id(other)][0])
+        # Closer planes are slices of one uneven wall.
+        if apart > 2.0 * config.distance_threshold:
+            ratio = worth(other) / worth(good[0])
+            if ratio >= _EQUAL:
+                raise AmbiguousWallError(
+                    f"two planes {apart:.3f} m apart are about equally good walls, "
+                    f"{good[0].count / total:.0%} and {other.count / total:.0%} of the "
+                    "points; the expected distance of the wall must tell them apart."
+                )
     if good:
-        return max(good, key=lambda number: planes[number].count)
+        return next(i for i, plane in enumerate(planes) if plane is good[0])
     if not planes:
         raise NoWallError(f"there is no plane among {total} points.")
-    largest = max(range(len(planes)), key=lambda number: planes[number].count)
-    distance, angle = offs[largest]
+    if not upright:
+        raise NoWallError(
+            f"all {len(planes)} planes are level, as floors are; none is a wall."
+        )
+    largest = max(upright, key=lambda plane: plane.count)
+    distance, angle = offs[id(largest)]
     place = "runs past the tile"
     if math.isfinite(distance):
         side = "before" if distance > 0 else "behind"
         place = f"lies {abs(distance):.3f} m {side} the expected wall"
-    raise NoWallError(
+    oblique = abs(distance) <= limit and largest.count >= least
+    raise (ObliqueWallError if oblique else NoWallError)(
         f"no plane with {config.min_wall_share:.0%} or more of the points is within "
         f"{limit:g} m and {config.wall_angle_tolerance_deg:g} deg of the expected "
-        f"wall; the largest of {len(planes)} has {planes[largest].count / total:.0%} "
+        f"wall; the largest of {len(upright)} has {largest.count / total:.0%} "
         f"of the points, {place} and is turned {math.degrees(angle):.1f} deg from it."
     )
 

@@ -80,4 +80,6 @@ class WallSegmenter(Stage):
             **self._size,
             config=self._config,
             seed=self._seed,
+            counts=surface_map.counts,
+            variances=surface_map.variances,
         )

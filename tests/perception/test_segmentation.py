@@ -8,6 +8,7 @@ from perception.config import SegmentationConfig
 from perception.errors import NoWallError
 from perception.segmentation import segment_wall
 from perception.synthetic import EXAMPLE_PATCHES, Patch, synthetic_truth, synthetic_wall
+from perception.unseen import Reason
 
 SIZE = {"width": 2.0, "height": 2.0}
 GLASS = float("nan")
@@ -69,13 +70,14 @@ def test_wall_on_both_sides_of_a_door_is_wall():
     assert set(np.unique(result.labels[result.wall_mask])) == {1, 2}
 
 
-def test_hole_that_nothing_came_back_from_is_painted_only_if_tiny():
-    large = Patch(0.5, 0.5, 0.6, 0.6, GLASS)  # 100 cm²
-    tiny = Patch(1.5, 1.5, 1.55, 1.55, GLASS)  # 25 cm²
-    result = segment(cloud([large, tiny]))
-    assert not result.wall_mask[51:59, 51:59].any()
-    assert result.wall_mask[150:155, 150:155].all()
-    assert np.isnan(result.depth[151:154, 151:154]).all()
+def test_what_nothing_came_back_from_is_painted_only_in_gaps_between_points():
+    hole = Patch(0.5, 0.5, 0.55, 0.55, GLASS)  # 5 x 5 cells
+    gap = Patch(1.5, 1.5, 1.52, 1.52, GLASS)  # 2 x 2 cells
+    result = segment(cloud([hole, gap], spacing=0.005))
+    assert not result.wall_mask[51:54, 51:54].any()
+    assert (result.reason[51:54, 51:54] == Reason.UNSEEN).all()
+    assert result.wall_mask[150:152, 150:152].all()
+    assert np.isnan(result.depth[150:152, 150:152]).all()
 
 
 def test_things_seen_through_a_window_do_not_break_the_wall_beside_it():

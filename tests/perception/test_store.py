@@ -32,6 +32,20 @@ def test_segmentation_comes_back_as_it_was(tmp_path):
     assert loaded.cell == 0.01
 
 
+def test_what_fine_steps_add_comes_back_too(tmp_path):
+    extras = {
+        "surface": np.full((2, 3), 0.001, dtype=np.float32),
+        "normals": np.tile(np.float32([0.0, 0.0, 1.0]), (2, 3, 1)),
+        "confidence": np.full((2, 3), 0.9, dtype=np.float32),
+        "reason": np.array([[0, 0, 1], [3, 0, 1]], dtype=np.uint8),
+    }
+    save_segmentation(tmp_path / "s.npz", make_segmentation().replace(**extras))
+    loaded = load_segmentation(tmp_path / "s.npz")
+    for name, grid in extras.items():
+        np.testing.assert_array_equal(getattr(loaded, name), grid)
+        assert getattr(loaded, name).dtype == grid.dtype
+
+
 def test_file_has_the_names_and_types_of_the_design(tmp_path):
     save_segmentation(tmp_path / "segmentation.npz", make_segmentation())
     with np.load(tmp_path / "segmentation.npz") as file:

@@ -32,6 +32,16 @@ def make_segmenter(**changes):
     return WallSegmenter(**{**options, **changes})
 
 
+def surface_map(points):
+    """A map of points that were measured ten times each."""
+    count = points.shape[1]
+    return SurfaceMap.empty().replace(
+        p_WQs=points,
+        counts=np.full(count, 10),
+        variances=np.full(count, 0.0015**2, dtype=np.float32),
+    )
+
+
 def answer(wall, request=REQUEST):
     """The result after one look at a request."""
     rng = np.random.default_rng(0)
@@ -41,9 +51,7 @@ def answer(wall, request=REQUEST):
     context = simulator.get_mutable_context()
     dut.GetInputPort("request").FixValue(context, Value(request))
     dut.GetInputPort("wall").FixValue(context, Value(wall))
-    dut.GetInputPort("surface_map").FixValue(
-        context, Value(SurfaceMap.empty().replace(p_WQs=points))
-    )
+    dut.GetInputPort("surface_map").FixValue(context, Value(surface_map(points)))
     simulator.AdvanceTo(0.05)
     return dut.GetOutputPort("result").Eval(context)
 
