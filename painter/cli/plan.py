@@ -15,21 +15,30 @@ from painter.cli.common import (
     print_result,
     progress,
 )
-from painter.config import load_scenario
+from painter.config import Scenario, load_scenario
 from painter.diagrams.arm_model import (
     GetArmKinematics,
     GetArmLimits,
     MakeArmPlant,
     MakeCollisionChecker,
 )
-from painter.planning.program import plan_program
+from painter.errors import InputError
+from painter.planning.preview import preview_film
+from painter.planning.program import nominal_film, program_of
+from painter.planning.raster import plan_strokes
 from painter.planning.store import program_summary, save_program
 from painter.planning.tile import nominal_tile_pose
+from painter.planning.touch_up import marked_cells, touch_up_strokes
+from painter.run.film_on_tile import film_on_tile
+from painter.run.film_preview import preview_picture
+from painter.run.folder import RunFolder
 from painter.run.pictures import stroke_picture
 from painter.run.style import png
 from perception.store import load_segmentation
+from perception.values import FloatArray, WallSegmentation
 
 PICTURE_FILE = "program.png"
+PREVIEW_FILE = "film.png"
 
 
 def plan(
@@ -51,13 +60,42 @@ def plan(
             "walls, whose frame is not the robot's.",
         ),
     ] = False,
+    from_stroke: Annotated[
+        float,
+        typer.Option(
+            help="Number of the stroke to begin with, from 1; 12.4 begins where four "
+            "tenths of the twelfth are done."
+        ),
+    ] = 1.0,
+    touch_up: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN",
+            help="Run folder: plan only the strokes that mend its film where it is "
+            "thin.",
+        ),
+    ] = None,
+    mark: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,X,Y...",
+            help="Plan only the strokes that paint what is inside this mark anew: two "
+            "opposite corners of a rectangle or the corners of a polygon, m from the "
+            "tile's lower left corner.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan the paint program of a segmented wall.
 
-    The arm starts and ends at its home pose. Writes program.json, trajectory.npz and
-    program.png.
+    The arm starts and ends at its home pose. Writes program.json, trajectory.npz,
+    program.png and film.png, the film that the strokes will leave.
+
+    Raises:
+        InputError: The options do not go together or name nothing to be read.
     """
+    if touch_up is not None and mark is not None:
+        raise InputError("--touch-up and --mark: only one of them can be given.")
     job = load_scenario(scenario, overrides or ())
     wall = load_segmentation(segmentation)
     if expected_wall:
@@ -68,22 +106,51 @@ def plan(
         checker = MakeCollisionChecker(job.directives, clearance=job.motion.clearance)
         show(0.4, "strokes and moves")
         start = time.perf_counter()
-        program = plan_program(
+        robot = {
+            "kinematics": GetArmKinematics(plant),
+            "limits": GetArmLimits(plant),
+            "checker": checker,
+        }
+        settings = {"tip": job.gun.tip, "raster": job.raster}
+        home = np.deg2rad(job.motion.home_deg)
+        film = _film_to_mend(wall, touch_up, mark, job)
+        if film is None:
+            strokes = plan_strokes(
+                np.asarray(wall.wall_mask),
+                wall.cell,
+                height=np.asarray(wall.depth, dtype=np.float64),
+                **settings,
+            )
+        else:
+            strokes = touch_up_strokes(
+                film,
+                np.asarray(wall.wall_mask),
+                wall.cell,
+                nominal=nominal_film(wall, **settings),
+                **settings,
+            )
+        program = program_of(
+            strokes,
             wall,
-            np.deg2rad(job.motion.home_deg),
-            kinematics=GetArmKinematics(plant),
-            limits=GetArmLimits(plant),
-            checker=checker,
-            tip=job.gun.tip,
-            raster=job.raster,
+            home,
             motion=job.motion,
+            from_stroke=from_stroke,
+            **robot,
+            **settings,
         )
         compute_time = time.perf_counter() - start
         show(0.8, "files")
-        save_program(folder, program)
+        nominal = program.nominal_thickness
+        preview = preview_film(program.strokes, wall, tip=job.gun.tip, nominal=nominal)
+        save_program(folder, program, preview)
         (folder / PICTURE_FILE).write_bytes(png(stroke_picture(program, wall)))
+        drawn = preview_picture(preview, wall, nominal)
+        (folder / PREVIEW_FILE).write_bytes(png(drawn))
         show(1.0, "done")
-    result = program_summary(program) | {"planning_time": compute_time}
+    result = program_summary(program) | {
+        "planning_time": compute_time,
+        "predicted": preview.figures(),
+    }
     for item in program.skipped:
         typer.echo(
             f"skipped {item.stroke.length:.2f} m on line {item.stroke.column + 1}: "
@@ -91,3 +158,21 @@ def plan(
             err=True,
         )
     print_result(result, as_json=as_json)
+
+
+def _film_to_mend(
+    wall: WallSegmentation, touch_up: Path | None, mark: str | None, job: Scenario
+) -> FloatArray | None:
+    """Returns the film (ny, nx), m, on the wall's grid; None = paint it all."""
+    shape, cell = wall.wall_mask.shape, wall.cell
+    if touch_up is not None:
+        return film_on_tile(RunFolder(touch_up), wall)
+    if mark is None:
+        return None
+    try:
+        corners = np.array([float(word) for word in mark.split(",")]).reshape(-1, 2)
+        marked = marked_cells(corners, shape, cell)
+    except ValueError as error:
+        raise InputError(f"--mark {mark!r}: {error}") from error
+    nominal = nominal_film(wall, tip=job.gun.tip, raster=job.raster)
+    return np.where(marked, 0.0, nominal)

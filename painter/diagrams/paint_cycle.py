@@ -102,7 +102,12 @@ def MakeBrain(scenario: Scenario) -> Diagram:
     )
     planner = add(
         "spray_path_planner",
-        SprayPathPlanner(tip=scenario.gun.tip, raster=scenario.raster, **planning),
+        SprayPathPlanner(
+            tip=scenario.gun.tip,
+            raster=scenario.raster,
+            from_stroke=scenario.cycle.from_stroke,
+            **planning,
+        ),
     )
     follower = add("path_follower", PathFollower(period=period))
     cycle = add(
@@ -112,6 +117,7 @@ def MakeBrain(scenario: Scenario) -> Diagram:
             period=period,
             look_time=scenario.scan.look_time,
             time_limit=scenario.cycle.time_limit,
+            from_stroke=scenario.cycle.from_stroke,
         ),
     )
     stages = dict(zip(STAGES, (mover, finder, segmenter, planner), strict=True))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.planning import CollisionChecker
 
-from painter.errors import CollisionError, ReachError
+from painter.errors import CollisionError, InputError, ReachError
 from painter.planning.blend import MovingState
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
@@ -68,7 +68,7 @@ def plan_program(
         The program, verified; its motion ends at the home pose.
 
     Raises:
-        ValueError: There is no such stroke.
+        InputError: There is no such stroke.
         ReachError: More than a twentieth of the strokes is out of the arm's reach.
         CollisionError: There is no clear way to any stroke, or home.
         MotionLimitError: The finished motion fails its verification.
@@ -182,10 +182,10 @@ def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke,
             stroke that is done.
 
     Raises:
-        ValueError: There is no such stroke.
+        InputError: There is no such stroke.
     """
     if not 1.0 <= from_stroke < len(strokes) + 1.0:
-        raise ValueError(
+        raise InputError(
             f"from_stroke must be 1 to {len(strokes)}, the number of strokes, got "
             f"{from_stroke!r}."
         )

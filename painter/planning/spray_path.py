@@ -75,6 +75,12 @@ class Motion(FrozenValue):
             return 0.0
         return 1.0 if self.flow is None else float(self.flow[index])
 
+    def strokes_done(self, time: float) -> float:
+        """Returns how many strokes are sprayed at `time` (s), with the share of one."""
+        opens, closes = self.spray_on[:, 0], self.spray_on[:, 1]
+        shares = np.clip((time - opens) / (closes - opens), 0.0, 1.0)
+        return float(shares.sum())
+
     def sprays_within(self, start: float, end: float) -> bool:
         """Returns whether the gun is to be open at any time in [start, end] (s)."""
         opens, closes = self.spray_on[:, 0], self.spray_on[:, 1]

@@ -146,7 +146,13 @@ class PaintCycle(LeafSystem):
     """
 
     def __init__(
-        self, *, unattended: bool, period: float, look_time: float, time_limit: float
+        self,
+        *,
+        unattended: bool,
+        period: float,
+        look_time: float,
+        time_limit: float,
+        from_stroke: float = 1.0,
     ) -> None:
         """Creates the cycle.
 
@@ -155,11 +161,13 @@ class PaintCycle(LeafSystem):
             period: Time between decisions, s.
             look_time: How long the arm stands still for first sight, s.
             time_limit: A cycle that lasts longer is a fault, s.
+            from_stroke: Number of the stroke with which the planner begins.
         """
         super().__init__()
         self._unattended = unattended
         self._look_time = look_time
         self._time_limit = time_limit
+        self._from_stroke = from_stroke
         # Inputs.
         self._status_port = self.DeclareAbstractInputPort(
             "arm_status", Value(ArmStatus())
@@ -229,6 +237,7 @@ class PaintCycle(LeafSystem):
         phase = now.status.phase
         if phase in (Phase.FAULT, Phase.ABORTED):
             return self._NextStopped(context, now, follower)
+        now = self._CountStrokes(now, follower)
         fault = EvalAs(self._status_port, context, ArmStatus).fault
         if fault is None and time > self._time_limit:
             fault = f"cycle not done after {self._time_limit:g} s"
@@ -240,6 +249,18 @@ class PaintCycle(LeafSystem):
         if now.pausing:
             return self._NextPaused(now, follower, time)
         return self._NextStep(context, now, follower)
+
+    def _CountStrokes(self, now: CycleState, follower: FollowerStatus) -> CycleState:
+        """Keeps with which stroke the job would go on; the gun closes at once."""
+        painting = SEQUENCE[now.step].action == Action.PAINT and now.moving
+        if not painting or follower.number != now.command.number:
+            return now
+        done = follower.strokes_done
+        whole, begun = divmod(self._from_stroke, 1.0)
+        number = whole + (done if done >= 1.0 else begun + (1.0 - begun) * done)
+        if number == now.status.next_stroke:
+            return now
+        return now.replace(status=now.status.replace(next_stroke=number))
 
     def _NextOperator(
         self, context: Context, now: CycleState, time: float
@@ -278,7 +299,9 @@ class PaintCycle(LeafSystem):
     ) -> CycleState:
         now = now.with_command(rate=0.0, spray=False).replace(moving=False, since=time)
         now = now.replace(status=now.status.replace(cause=cause))
-        return now.in_phase(phase, time).logged(time, "stopped", cause=cause)
+        at = now.status.next_stroke
+        data = {"cause": cause} | ({"next_stroke": at} if at else {})
+        return now.in_phase(phase, time).logged(time, "stopped", **data)
 
     def _NextStopped(
         self, context: Context, now: CycleState, follower: FollowerStatus

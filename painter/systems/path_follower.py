@@ -245,5 +245,6 @@ class PathFollower(LeafSystem):
                 duration=now.motion.duration,
                 rate=rate,
                 spraying=bool(now.motion.trigger(position)),
+                strokes_done=now.motion.strokes_done(max(position, now.sprayed_to)),
             )
         )

@@ -52,6 +52,7 @@ class SprayPathPlanner(Stage):
         raster: RasterConfig,
         motion: MotionConfig,
         period: float,
+        from_stroke: float = 1.0,
     ) -> None:
         """Creates the stage.
 
@@ -64,6 +65,7 @@ class SprayPathPlanner(Stage):
             raster: Settings of the strokes.
             motion: Settings of the motion.
             period: Time between looks at the request, s.
+            from_stroke: Number of the stroke to begin with; see `plan_program`.
 
         Raises:
             ValueError: A setting is out of bounds.
@@ -80,6 +82,7 @@ class SprayPathPlanner(Stage):
             "tip": tip,
             "raster": raster,
             "motion": motion,
+            "from_stroke": from_stroke,
         }
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 10)

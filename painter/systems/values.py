@@ -122,6 +122,8 @@ class FollowerStatus(FrozenValue):
         duration: Of the whole motion, s.
         rate: Path time per time: 1 = as planned, 0 = standing.
         spraying: Whether the motion has its gun open there.
+        strokes_done: How many of the motion's strokes are behind it, with the share of
+            the one that it is on.
     """
 
     number: int = 0
@@ -129,6 +131,7 @@ class FollowerStatus(FrozenValue):
     duration: float = 0.0
     rate: float = 0.0
     spraying: bool = False
+    strokes_done: float = 0.0
 
     @property
     def done(self) -> bool:
@@ -144,10 +147,14 @@ class CycleStatus(FrozenValue):
         phase: Present phase.
         cause: Why the cycle is in FAULT or ABORTED, else "".
         finished: True once nothing more will happen.
+        next_stroke: Number of the stroke, from 1, with which a job that was paused or
+            stopped goes on; its fraction is the share of it that is done. 0 = painting
+            has not begun.
         events: What happened so far: (time s, name, data) each.
     """
 
     phase: Phase = Phase.HOME
     cause: str = ""
     finished: bool = False
+    next_stroke: float = 0.0
     events: tuple[tuple[float, str, dict[str, Any]], ...] = ()

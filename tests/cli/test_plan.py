@@ -77,3 +77,39 @@ def test_unusable_input_is_one_line_and_exit_2(wall, tmp_path, capsys):
         assert run(["plan", *words, "--out", out]) == 2
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert text in line
+
+
+def strokes_of(folder):
+    return load_program(folder).strokes
+
+
+def test_mark_is_painted_anew_and_nothing_else(wall, tmp_path):
+    out = tmp_path / "out"
+    assert run(["plan", wall, "--mark", "0.2,1.6,0.4,1.8", "--out", str(out)]) == 0
+    strokes = strokes_of(out)
+    assert strokes
+    assert {stroke.kind for stroke in strokes} == {"touch_up"}
+    ends = np.array([[stroke.start_T, stroke.end_T] for stroke in strokes])
+    # Strokes lap over the rim of the mark by a part of their narrow fan.
+    np.testing.assert_array_less([0.17, 1.57], ends.min(axis=(0, 1)))
+    np.testing.assert_array_less(ends.max(axis=(0, 1)), [0.43, 1.83])
+
+
+def test_job_goes_on_from_a_stroke(wall, tmp_path):
+    for name, words in (("all", []), ("rest", ["--from-stroke", "4.5"])):
+        assert run(["plan", wall, *words, "--out", str(tmp_path / name)]) == 0
+    whole, rest = strokes_of(tmp_path / "all"), strokes_of(tmp_path / "rest")
+    assert len(rest) == len(whole) - 3
+    assert rest[0].length == pytest.approx(whole[3].length / 2.0)
+
+
+def test_options_that_do_not_fit_are_refused(wall, tmp_path, capsys):
+    out = str(tmp_path / "out")
+    for words, text in (
+        (["--mark", "1,2,3"], "--mark '1,2,3'"),
+        (["--from-stroke", "500"], "from_stroke must be 1 to"),
+        (["--touch-up", str(tmp_path)], "film.npz: no such file"),
+        (["--touch-up", "x", "--mark", "0,0,1,1"], "only one of them"),
+    ):
+        assert run(["plan", wall, *words, "--out", out]) == 2
+        assert text in capsys.readouterr().err.strip().splitlines()[-1]

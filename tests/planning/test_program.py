@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from painter.errors import MotionLimitError, ReachError
+from painter.errors import InputError, MotionLimitError, ReachError
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.program import plan_program, program_of
 from painter.planning.spray_path import Motion, Stroke
@@ -106,8 +106,8 @@ def test_blank_tile_takes_no_longer_than_its_strokes_and_turns(robot, make_wall)
 def test_strokes_beside_a_tall_box_are_cut_back_and_reported(robot, make_wall):
     program = plan(robot, make_wall(TALL_BOX))
     assert program.skipped
+    assert any("too near" in item.reason for item in program.skipped)
     for item in program.skipped:
-        assert "too near" in item.reason
         assert 0.0 <= min(item.stroke.start_T[0], item.stroke.end_T[0]) <= 0.55
     done = sum(stroke.length for stroke in program.strokes)
     left_out = sum(item.stroke.length for item in program.skipped)
@@ -168,7 +168,7 @@ def test_program_from_a_stroke_on_is_the_rest_of_the_program(robot, make_wall):
 
 
 def test_there_must_be_such_a_stroke(robot, make_wall):
-    with pytest.raises(ValueError, match="from_stroke must be 1 to"):
+    with pytest.raises(InputError, match="from_stroke must be 1 to"):
         plan(robot, make_wall(), from_stroke=99.0)
 
 

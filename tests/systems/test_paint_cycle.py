@@ -44,7 +44,9 @@ class ScriptedStage(Stage):
 class Rig:
     """Cycle, follower and scripted stages; the test plays operator and drives."""
 
-    def __init__(self, *, unattended=True, time_limit=60.0, **answers) -> None:
+    def __init__(
+        self, *, unattended=True, time_limit=60.0, from_stroke=1.0, **answers
+    ) -> None:
         program = PaintProgram(
             strokes=(),
             motion=still_motion([SPRAY]),
@@ -62,7 +64,11 @@ class Rig:
         self.cycle = builder.AddNamedSystem(
             "cycle",
             PaintCycle(
-                unattended=unattended, period=0.02, look_time=0.5, time_limit=time_limit
+                unattended=unattended,
+                period=0.02,
+                look_time=0.5,
+                time_limit=time_limit,
+                from_stroke=from_stroke,
             ),
         )
         self.follower = builder.AddNamedSystem("follower", PathFollower(period=0.02))
@@ -190,6 +196,27 @@ def test_abort_closes_the_gun_stands_and_retracts():
     assert "operator" in rig.status.cause
     # The retract motion ran: HOME, LOOK, SCAN, PAINT and then the fifth.
     assert rig.output(rig.follower, "status").number == 5
+
+
+@pytest.mark.parametrize("from_stroke", [1.0, 3.5])
+def test_a_stopped_job_knows_with_which_stroke_it_goes_on(from_stroke):
+    rig = Rig(from_stroke=from_stroke)
+    assert rig.status.next_stroke == 0.0
+    rig.advance_until(lambda: rig.trigger == 1.0)
+    opened = rig.context.get_time()
+    rig.advance_until(lambda: rig.context.get_time() > opened + 0.1)
+    rig.say("abort")
+    rig.advance_until(lambda: rig.trigger == 0.0)
+    closed = rig.context.get_time()
+    rig.advance_to_end()
+    # The one stroke of the program is the rest of the stroke begun with.
+    share = (closed - opened) / (SPRAY[1] - SPRAY[0])
+    expected = from_stroke + (np.ceil(from_stroke + 0.01) - from_stroke) * share
+    # Decisions and looks at them are a period of 0.02 s apart each.
+    assert rig.status.next_stroke == pytest.approx(expected, abs=0.04 / 0.3)
+    assert from_stroke < rig.status.next_stroke < np.ceil(from_stroke + 0.01)
+    (data,) = (data for _, name, data in rig.status.events if name == "stopped")
+    assert data["next_stroke"] == rig.status.next_stroke
 
 
 def test_a_word_out_of_place_is_logged_as_refused():
