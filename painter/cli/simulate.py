@@ -20,6 +20,7 @@ from painter.diagrams.simulation import (
     clearance_violations,
 )
 from painter.errors import FaultError
+from painter.planning.preview import preview_film
 from painter.planning.stroke_lines import nominal_pitch
 from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
 from painter.run.folder import LOOK, SCENE, RunFolder
@@ -160,7 +161,13 @@ def write_log(folder: RunFolder, scenario: Scenario, log: CycleLog) -> None:
         )
     )
     if log.program is not None:
-        folder.save_program(log.program)
+        preview = preview_film(
+            log.program.strokes,
+            log.segmentation,
+            tip=scenario.gun.tip,
+            nominal=log.program.nominal_thickness,
+        )
+        folder.save_program(log.program, preview)
     surface = height_field(
         scene,
         cell=log.film.cell,

@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from painter.errors import InputError
+from painter.planning.preview import FilmPreview
 from painter.planning.spray_path import Motion, PaintProgram, SkippedStroke, Stroke
 from perception.values import FloatArray
 
@@ -33,12 +34,15 @@ def program_summary(program: PaintProgram) -> dict[str, Any]:
     }
 
 
-def save_program(folder: Path, program: PaintProgram) -> None:
+def save_program(
+    folder: Path, program: PaintProgram, preview: FilmPreview | None = None
+) -> None:
     """Writes a program; each of the two files is there whole or not at all.
 
     Args:
         folder: Where to; it exists.
         program: What to write.
+        preview: The film that it will leave; figures and map go with the program.
     """
     motion = program.motion
     strokes = [
@@ -52,6 +56,7 @@ def save_program(folder: Path, program: PaintProgram) -> None:
         "standoff": program.standoff,
         "nominal_thickness": program.nominal_thickness,
         "paint_volume": program.paint_volume,
+        "predicted": None if preview is None else preview.figures(),
         "strokes": strokes,
         "skipped": [
             _stroke_fields(item.stroke) | {"reason": item.reason}
@@ -60,6 +65,8 @@ def save_program(folder: Path, program: PaintProgram) -> None:
     }
     trigger = np.array([motion.trigger(time) for time in motion.time])
     arrays = {"time": motion.time, "q": motion.q, "v": motion.v, "trigger": trigger}
+    if preview is not None:
+        arrays["predicted_film"] = preview.film.astype(np.float32)
     draft = folder / f".{TRAJECTORY_FILE}"  # savez would append .npz to another suffix.
     np.savez_compressed(draft, **arrays)  # type: ignore[arg-type]
     os.replace(draft, folder / TRAJECTORY_FILE)

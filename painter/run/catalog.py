@@ -198,6 +198,14 @@ FIGURES = (
     FigureInfo(
         "sprayed_m3", FILM, "Paint that left the gun.", unit="l", scale=1e3, digits=3
     ),
+    _percent("predicted_coverage", FILM, "Coverage as planned, by the closed form."),
+    _percent("predicted_overspray", FILM, "Overspray as planned, likewise."),
+    _percent(
+        "predicted_film_error",
+        FILM,
+        "Mean |planned - laid film| on the tile, share of nominal.",
+        at_most=0.05,
+    ),
     FigureInfo("stroke_count", ARM, "Strokes of the program.", digits=0),
     FigureInfo("stroke_length_m", ARM, "Their length in all.", unit="m"),
     FigureInfo(

@@ -4,6 +4,7 @@ from typing import Any
 
 from painter.planning.spray_path import PaintProgram
 from painter.run.film_figures import film_figures, mass_balance_error
+from painter.run.film_preview import predicted_figures
 from painter.run.folder import RunFolder
 from painter.run.mask_figures import mask_figures, tile_figures
 from painter.run.time_figures import (
@@ -99,6 +100,7 @@ def _film(
     figures = film_figures(
         film, nominal=program.nominal_thickness, fan_width=fan_width(scenario)
     )
+    figures |= predicted_figures(folder, program, film, scenario)
     return figures | {
         "mass_balance_error": mass_balance_error(film, efficiency),
         "sprayed_m3": film.sprayed,

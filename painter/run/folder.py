@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 
 from painter.errors import InputError, PainterError
+from painter.planning.preview import FilmPreview
 from painter.planning.spray_path import PaintProgram
 from painter.planning.store import load_program, save_program
 from painter.run import arrays
@@ -198,9 +199,11 @@ class RunFolder:
         """Reads segmentation.npz."""
         return self._read(SEGMENTATION, load_segmentation)
 
-    def save_program(self, program: PaintProgram) -> None:
-        """Writes program.json and trajectory.npz."""
-        save_program(self.path, program)
+    def save_program(
+        self, program: PaintProgram, preview: FilmPreview | None = None
+    ) -> None:
+        """Writes program.json and trajectory.npz, with the film to come if given."""
+        save_program(self.path, program, preview)
 
     def program(self) -> PaintProgram | None:
         """Reads program.json and trajectory.npz."""

@@ -15,6 +15,7 @@ from painter.run import charts, pictures, style
 from painter.run import folder as files
 from painter.run.catalog import FIGURES, HEADLINE, FigureInfo, figure_info
 from painter.run.figures import fan_width
+from painter.run.film_preview import preview_picture, run_preview
 from painter.run.folder import RunFolder
 from painter.run.time_figures import COLLISION, DONE, STOPPED, named, phase_spans
 
@@ -168,6 +169,11 @@ def _wall(folder: RunFolder) -> list[str]:
         text = "wet paint on the true surface as seen from the robot."
         drawn = pictures.film_picture(film, nominal)
         shown.append(_picture("Film", text, style.png(drawn)))
+        planned = run_preview(folder, program, folder.scenario())
+        if planned is not None and segmentation is not None:
+            text = "wet paint as planned, over the mask as the robot saw it."
+            drawn = preview_picture(planned, segmentation, nominal)
+            shown.append(_picture("Film as planned", text, style.png(drawn)))
         text = "share of the wall's cells by wet thickness."
         drawn = charts.film_histogram(film, nominal, fan_width(folder.scenario()))
         shown.append(_picture("Film thickness", text, style.png(drawn)))

@@ -117,7 +117,7 @@ def test_a_window_is_cut_in_within_the_bounds():
     plain = plan_strokes(mask, CELL, tip=TIP, raster=RasterConfig(cut_in=False))
     found, before = figures(mask, strokes), figures(mask, plain)
     assert found["coverage"] >= 0.96 and found["overspray"] <= 0.05
-    assert found["cv"] <= 0.10 and found["keepout"] <= 0.03
+    assert found["cv"] <= 0.11 and found["keepout"] <= 0.03
     assert before["keepout"] > 0.1 and before["coverage"] < found["coverage"]
     near = [s for s in strokes if s.kind == "cut_in"]
     assert near and all(s.standoff < 0.3 and s.flow < 1.0 for s in near)

@@ -1,0 +1,102 @@
+"""The film as planned: its picture, and how near it came to the film as laid."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from painter.planning.config import TipConfig
+from painter.planning.preview import FilmPreview, preview_film
+from painter.planning.spray_path import PaintProgram
+from painter.planning.tile import grid_points
+from painter.run import style
+from painter.run.folder import RunFolder
+from painter.run.values import Film
+from perception.values import WallSegmentation
+
+
+def run_preview(
+    folder: RunFolder, program: PaintProgram, scenario: dict[str, Any]
+) -> FilmPreview | None:
+    """Predicts the film of a run's program on the wall as the robot saw it.
+
+    Args:
+        folder: The run.
+        program: Its program.
+        scenario: Its scenario, for the tip.
+
+    Returns:
+        The prediction, or None if the run has no segmentation.
+    """
+    segmentation = folder.segmentation()
+    if segmentation is None:
+        return None
+    return preview_film(
+        program.strokes,
+        segmentation,
+        tip=TipConfig(**scenario["gun"]["tip"]),
+        nominal=program.nominal_thickness,
+    )
+
+
+def predicted_figures(
+    folder: RunFolder, program: PaintProgram, film: Film, scenario: dict[str, Any]
+) -> dict[str, float]:
+    """Returns what was planned, and the mean difference from what was laid.
+
+    Args:
+        folder: The run.
+        program: Its program.
+        film: As laid.
+        scenario: Its scenario.
+
+    Returns:
+        `predicted_coverage`, `predicted_overspray` and `predicted_film_error`, the mean
+        |planned - laid| over the tile as share of nominal; none without truth.
+    """
+    preview, truth = run_preview(folder, program, scenario), folder.truth()
+    if preview is None or truth is None:
+        return {}
+    ny, nx = film.thickness.shape
+    x = film.x0 + (np.arange(nx) + 0.5) * film.cell
+    y = film.y0 + (np.arange(ny) + 0.5) * film.cell
+    X_TS = program.X_WT.inverse() @ truth.X_WS
+    p_TQs = X_TS @ grid_points(x, y)
+    planned = preview.film_at(p_TQs[0], p_TQs[1]).reshape(ny, nx)
+    tile = film.truth_paintable | film.truth_keepout
+    error = np.abs(planned - film.thickness)[tile].mean()
+    return {
+        "predicted_coverage": preview.coverage,
+        "predicted_overspray": preview.overspray,
+        "predicted_film_error": float(error / program.nominal_thickness),
+    }
+
+
+@style.styled
+def preview_picture(
+    preview: FilmPreview, segmentation: WallSegmentation, nominal: float
+) -> Figure:
+    """Draws the film as planned, % of nominal, with the edges of what stays clean."""
+    ny, nx = preview.film.shape
+    low = -preview.border * preview.cell
+    right, top = low + nx * preview.cell, low + ny * preview.cell
+    figure = style.new_figure(5.8, 4.9)
+    axes = style.tile_axes(figure, right, top)
+    axes.set(xlim=(low, right), ylim=(low, top))
+    shown = axes.imshow(
+        100 * preview.film / nominal,
+        origin="lower",
+        extent=(low, right, low, top),
+        cmap="viridis",
+        vmin=0,
+        vmax=150,
+        interpolation="nearest",
+    )
+    mask = np.pad(np.asarray(segmentation.wall_mask), preview.border)
+    x = low + (np.arange(nx) + 0.5) * preview.cell
+    y = low + (np.arange(ny) + 0.5) * preview.cell
+    if mask.any():
+        axes.contour(x, y, mask, levels=[0.5], colors=[style.VERMILION], linewidths=1.1)
+    bar = figure.colorbar(shown, ax=axes, extend="max", shrink=0.9, pad=0.02)
+    bar.set_label(f"wet film as planned [% of nominal {1e6 * nominal:.0f} µm]")
+    return figure
