@@ -134,7 +134,7 @@ def clear_feet(steps: SegmentationSteps, *, limit: float) -> SegmentationSteps:
     """Takes the feet of obstacles out of the mask.
 
     What stands on a wall has sides. Seen at a slant they are narrow strips, too small
-    to be regions, and inherit from the wall as often as from the obstacle. Where most
+    to be regions, and inherit from the wall as often as from the obstacle. Where half
     of a cell's points lie before the wall, and such cells lead to an obstacle, they
     belong to it.
 
@@ -152,7 +152,8 @@ def clear_feet(steps: SegmentationSteps, *, limit: float) -> SegmentationSteps:
     inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
     cells = rows[inside] * nx + columns[inside]
     before = np.bincount(cells[p_TQs[2, inside] > limit], minlength=ny * nx)
-    raised = before > 0.5 * np.bincount(cells, minlength=ny * nx)
+    half = 0.5 * np.bincount(cells, minlength=ny * nx)
+    raised = (before > 0) & (before >= half)
     obstacle = ~result.wall_mask & (result.labels > 0) & (result.depth > limit)
     foot = binary_propagation(
         obstacle, np.ones((3, 3)), mask=obstacle | raised.reshape(ny, nx)
