@@ -1,0 +1,431 @@
+"""The pose graph: keyframes, plane landmarks, the mount's error and the base's shift.
+
+Minimises over all at once, by Gauss-Newton on a sparse system with graduated robust
+weights. Open3D's pose graph holds relative poses only, and would take the arm's
+absolute poses for links to a fixed node, without planes and slow states; GTSAM is no
+dependency. So the sum of squares is our own and SciPy solves it.
+
+Source: Yang et al., "Graduated non-convexity for robust spatial perception", 2020;
+Black and Rangarajan, "On the unification of line processes", 1996 (Geman-McClure).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from perception.mapping.config import MapperConfig
+from perception.mapping.keyframe import PlaneSight
+from perception.mapping.links import Link
+from perception.mapping.poses import Poses, skew
+from perception.values import BoolArray, FloatArray, IntArray
+
+_SCHEDULE = (1e5, 1e4, 1e3, 100.0, 30.0, 30.0, 30.0)
+"""Squared sigmas at which a link's weight has fallen to a quarter, round by round."""
+_QUICK = (1e3, 100.0, 30.0)
+"""The same between keyframes, when the last answer is near."""
+_LOOSE = 500.0
+"""Rounds above this let the base walk ten times as far."""
+_WALK = 4.0
+"""The same for steps of the base, which are rare and large (Cauchy's weights)."""
+_HALVED = 0.25
+"""Of a variance whose standard deviation was halved."""
+_WEAK = 1e-3
+"""Prior on what nothing else holds, in inverse squared metres or radians."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """Keyframe `k` saw landmark `plane` as `sight`."""
+
+    k: int
+    plane: int
+    sight: PlaneSight
+
+
+@dataclass(eq=False)
+class Problem:
+    """What is known of the keyframes.
+
+    Attributes:
+        X_WC: Where they are thought to be.
+        X_arm: (n) poses that the arm gives; rows without one are any pose.
+        has_arm: (n,) bool.
+        links: Between keyframes.
+        sightings: Of planes.
+        planes: (m, 4): unit normal in W and offset, n . p = d.
+    """
+
+    X_WC: Poses
+    X_arm: Poses
+    has_arm: BoolArray
+    links: list[Link]
+    sightings: list[Sighting]
+    planes: FloatArray
+
+
+@dataclass(eq=False)
+class Estimate:
+    """The graph after optimisation.
+
+    Attributes:
+        X_WC: Poses of the keyframes.
+        planes: (m, 4), as in `Problem`.
+        mount: (6,) step from the arm's camera frame to the true one.
+        mount_covariance: (6, 6) of it, rad and m squared.
+        mount_observed: (6, 6) projection on its observed directions, in units of its
+            prior; along the others it is held at zero.
+        base: (n) steps of the base in W at every keyframe, about the scan's middle.
+        link_weights: (links,) 0 = dropped, 1 = taken in full.
+        sight_weights: (sightings,) the same.
+        observed: (n, 6, 6) what links and planes tell of each keyframe.
+    """
+
+    X_WC: Poses
+    planes: FloatArray
+    mount: FloatArray
+    mount_covariance: FloatArray
+    mount_observed: FloatArray
+    base: Poses
+    link_weights: FloatArray
+    sight_weights: FloatArray
+    observed: FloatArray = field(repr=False)
+
+
+@dataclass
+class _System:
+    """Normal equations, added up block by block."""
+
+    size: int
+    slope: FloatArray = field(init=False)
+    rows: list[IntArray] = field(default_factory=list)
+    columns: list[IntArray] = field(default_factory=list)
+    values: list[FloatArray] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.slope = np.zeros(self.size)
+
+    def add(
+        self, parts: list[tuple[IntArray, FloatArray]], e: FloatArray, W: FloatArray
+    ) -> None:
+        """Adds factors.
+
+        Args:
+            parts: First unknown (f,) and Jacobian (f, r, c) of each part.
+            e: (f, r) residuals.
+            W: (f, r, r) their information.
+        """
+        for start, J in parts:
+            JW = np.swapaxes(J, 1, 2) @ W
+            index = start[:, None] + np.arange(J.shape[2])
+            np.add.at(self.slope, index, np.einsum("fcr,fr->fc", JW, e))
+            for start2, J2 in parts:
+                index2 = start2[:, None] + np.arange(J2.shape[2])
+                block = JW @ J2
+                self.values.append(block.ravel())
+                self.rows.append(
+                    np.broadcast_to(index[:, :, None], block.shape).ravel()
+                )
+                self.columns.append(
+                    np.broadcast_to(index2[:, None, :], block.shape).ravel()
+                )
+
+    def solve(self, block: int) -> tuple[FloatArray, FloatArray]:
+        """Returns the step that makes the slope vanish.
+
+        Args:
+            block: First of the six unknowns whose (6, 6) covariance is returned too.
+        """
+        everywhere = np.arange(self.size)
+        matrix = sparse.csc_matrix(
+            (
+                np.concatenate([*self.values, np.full(self.size, _WEAK)]),
+                (
+                    np.concatenate([*self.rows, everywhere]),
+                    np.concatenate([*self.columns, everywhere]),
+                ),
+            ),
+            shape=(self.size, self.size),
+        )
+        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A")
+        units = np.zeros((self.size, 6))
+        units[block : block + 6] = np.eye(6)
+        covariance = factors.solve(units)[block : block + 6]
+        return -factors.solve(self.slope), np.asarray(covariance)
+
+
+class Graph:
+    """Optimises one `Problem`; makes its arrays once."""
+
+    def __init__(self, problem: Problem, config: MapperConfig) -> None:
+        """Lays the problem out in arrays.
+
+        Args:
+            problem: Keyframes, links and sightings; not changed.
+            config: Sigmas and thresholds.
+        """
+        self._problem, self._config = problem, config
+        self._n, self._m = len(problem.X_WC), len(problem.planes)
+        links, sights = problem.links, problem.sightings
+        self._i = np.array([link.i for link in links], dtype=np.int64)
+        self._j = np.array([link.j for link in links], dtype=np.int64)
+        self._Z = Poses.of([link.X_ij for link in links])
+        self._omega = np.array([link.information for link in links]).reshape(-1, 6, 6)
+        self._k = np.array([s.k for s in sights], dtype=np.int64)
+        self._l = np.array([s.plane for s in sights], dtype=np.int64)
+        self._center = np.array([s.sight.center for s in sights]).reshape(-1, 3)
+        self._axes = np.array([s.sight.axes for s in sights]).reshape(-1, 3, 2)
+        sigma = [[s.sight.sigma, *s.sight.tilt_sigma] for s in sights]
+        self._plane_omega = np.array(sigma).reshape(-1, 3) ** -2.0
+        self._arm = np.flatnonzero(problem.has_arm)
+        middle = problem.X_WC.p.mean(axis=0) if self._n else np.zeros(3)
+        self._middle = middle
+        self._mount_prior = _information(config.mount_sigma, config.mount_sigma_deg)
+
+    def optimize(self, quick: bool = False) -> Estimate:
+        """Finds the most likely poses, with the mount's error where it is observed.
+
+        A second pass holds the mount at zero along directions whose standard deviation
+        the frames did not halve: there the answer would be noise within the prior.
+
+        Args:
+            quick: Fewer rounds and no second pass, while frames come in.
+
+        Returns:
+            The estimate; links with less than a twentieth of their weight are dropped.
+        """
+        schedule = _QUICK if quick else _SCHEDULE
+        estimate = self._optimize(self._mount_prior, schedule)
+        if quick or not len(self._arm):
+            return estimate
+        prior = self._mount_prior
+        sigma = np.diag(prior) ** -0.5
+        values, axes = np.linalg.eigh(
+            estimate.mount_covariance / np.outer(sigma, sigma)
+        )
+        kept = axes[:, values < _HALVED]
+        held = (np.eye(6) - kept @ kept.T) / np.outer(sigma, sigma)
+        estimate = self._optimize(prior + 1e6 * held, schedule)
+        return dataclasses.replace(estimate, mount_observed=kept @ kept.T)
+
+    def _optimize(self, mount_prior: FloatArray, schedule: Sequence[float]) -> Estimate:
+        problem, n, m = self._problem, self._n, self._m
+        X, planes = problem.X_WC, problem.planes.copy()
+        mount = Poses.identity(1)
+        base = Poses.identity(n)
+        link_weights = np.ones(len(problem.links))
+        sight_weights = np.ones(len(problem.sightings))
+        for scale in schedule:
+            system = _System(12 * n + 6 + 3 * m)
+            link_weights = self._add_links(system, X, scale)
+            sight_weights = self._add_planes(system, X, planes, scale)
+            self._add_arm(system, X, mount, base, mount_prior, scale > _LOOSE)
+            step, mount_covariance = system.solve(12 * n)
+            X = X.moved(step[: 6 * n].reshape(n, 6))
+            base = base.moved(step[6 * n : 12 * n].reshape(n, 6))
+            mount = mount.moved(step[12 * n : 12 * n + 6].reshape(1, 6))
+            planes = _turn_planes(
+                planes, step[12 * n + 6 :].reshape(m, 3), self._middle
+            )
+        return Estimate(
+            X_WC=X,
+            planes=planes,
+            mount=Poses.identity(1).steps_to(mount)[0],
+            mount_covariance=mount_covariance,
+            mount_observed=np.zeros((6, 6)),
+            base=base,
+            link_weights=np.where(link_weights < 0.05, 0.0, link_weights),
+            sight_weights=np.where(sight_weights < 0.05, 0.0, sight_weights),
+            observed=self._observed(X, planes, link_weights, sight_weights),
+        )
+
+    def _add_links(self, system: _System, X: Poses, scale: float) -> FloatArray:
+        if not len(self._i):
+            return np.zeros(0)
+        e, Ji, Jj = self._link_terms(X)
+        chi2 = np.einsum("fi,fij,fj->f", e, self._omega, e)
+        weights = (scale / (scale + chi2)) ** 2
+        W = self._omega * weights[:, None, None]
+        system.add([(6 * self._i, Ji), (6 * self._j, Jj)], e, W)
+        return np.asarray(weights)
+
+    def _link_terms(self, X: Poses) -> tuple[FloatArray, FloatArray, FloatArray]:
+        relative = X[self._i].inverse() @ X[self._j]
+        e = self._Z.steps_to(relative)
+        Rz_T = np.swapaxes(self._Z.R, 1, 2)
+        count = len(e)
+        Ji, Jj = np.zeros((count, 6, 6)), np.zeros((count, 6, 6))
+        Ji[:, :3, :3] = -np.swapaxes(relative.R, 1, 2)
+        Ji[:, 3:, :3] = Rz_T @ skew(relative.p)
+        Ji[:, 3:, 3:] = -Rz_T
+        Jj[:, :3, :3] = np.eye(3)
+        Jj[:, 3:, 3:] = Rz_T @ relative.R
+        return e, Ji, Jj
+
+    def _plane_terms(
+        self, X: Poses, planes: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance of the sight's centre from the landmark, and its axes' tilts."""
+        R, p = X.R[self._k], X.p[self._k]
+        n_W, d = planes[self._l, :3], planes[self._l, 3]
+        n_C = np.einsum("fji,fj->fi", R, n_W)
+        center_W = np.einsum("fij,fj->fi", R, self._center) + p
+        axes_W = R @ self._axes
+        count = len(d)
+        e = np.empty((count, 3))
+        e[:, 0] = np.sum(n_W * center_W, axis=1) - d
+        e[:, 1:] = np.einsum("fi,fia->fa", n_W, axes_W)
+        J_pose = np.zeros((count, 3, 6))
+        J_pose[:, 0, :3] = -np.einsum("fi,fij->fj", n_C, skew(self._center))
+        J_pose[:, 0, 3:] = n_C
+        for a in range(2):
+            turned = skew(self._axes[:, :, a])
+            J_pose[:, 1 + a, :3] = -np.einsum("fi,fij->fj", n_C, turned)
+        tangent = _tangents(planes)[self._l]
+        J_plane = np.zeros((count, 3, 3))
+        arm = center_W - self._middle
+        J_plane[:, 0, :2] = np.einsum("fi,fia->fa", arm, tangent)
+        J_plane[:, 0, 2] = -1.0
+        J_plane[:, 1:, :2] = np.einsum("fib,fia->fba", axes_W, tangent)
+        return e, J_pose, J_plane
+
+    def _add_planes(
+        self, system: _System, X: Poses, planes: FloatArray, scale: float
+    ) -> FloatArray:
+        if not len(self._k):
+            return np.zeros(0)
+        e, J_pose, J_plane = self._plane_terms(X, planes)
+        chi2 = np.sum(e**2 * self._plane_omega, axis=1)
+        weights = (scale / (scale + chi2)) ** 2
+        W = np.zeros((len(e), 3, 3))
+        W[:, range(3), range(3)] = self._plane_omega * weights[:, None]
+        start = 12 * self._n + 6 + 3 * self._l
+        system.add([(6 * self._k, J_pose), (start, J_plane)], e, W)
+        return np.asarray(weights)
+
+    def _add_arm(
+        self,
+        system: _System,
+        X: Poses,
+        mount: Poses,
+        base: Poses,
+        mount_prior: FloatArray,
+        loose: bool,
+    ) -> None:
+        """Adds priors of arm, mount and base; without an arm, a fixed first pose."""
+        config, n, k = self._config, self._n, self._arm
+        if not len(k):
+            e = self._problem.X_WC[:1].steps_to(X[:1])
+            W = np.diag([1e10] * 6)[None]
+            system.add([(np.zeros(1, np.int64), np.eye(6)[None])], e, W)
+            return
+        # Where the arm says it is, after mount and base are put right.
+        inner = self._problem.X_arm[k] @ mount[np.zeros(len(k), np.int64)]
+        about = Poses(inner.R, inner.p - self._middle)
+        expected = base[k] @ about
+        expected = Poses(expected.R, expected.p + self._middle)
+        e = expected.steps_to(X[k])
+        ones = np.tile(np.eye(6), (len(k), 1, 1))
+        J_base = np.zeros((len(k), 6, 6))
+        R_T = np.swapaxes(inner.R, 1, 2)
+        J_base[:, :3, :3] = -R_T
+        J_base[:, 3:, :3] = R_T @ skew(about.p)
+        J_base[:, 3:, 3:] = -R_T
+        W = np.tile(
+            _information(config.arm_sigma, config.arm_sigma_deg), (len(k), 1, 1)
+        )
+        middle = np.full(len(k), 12 * n)
+        system.add([(6 * k, ones), (6 * n + 6 * k, J_base), (middle, -ones)], e, W)
+        e = Poses.identity(1).steps_to(mount)
+        system.add([(np.array([12 * n]), np.eye(6)[None])], e, mount_prior[None])
+        first = (
+            np.eye(6)[None] * 1e10
+        )  # The base's shift counts from the first pose on.
+        e = Poses.identity(1).steps_to(base[:1])
+        system.add([(np.array([6 * n]), np.eye(6)[None])], e, first)
+        if n > 1:
+            self._add_walk(system, base, loose)
+
+    def _add_walk(self, system: _System, base: Poses, loose: bool) -> None:
+        n = self._n
+        e = base[np.arange(n - 1)].steps_to(base[np.arange(1, n)])
+        W = _information(self._config.base_sigma, self._config.base_sigma_deg)
+        chi2 = np.einsum("fi,ij,fj->f", e, W, e)
+        # Loose first, so that a step shows where it is; then steps are rare.
+        share = np.full(n - 1, 0.01) if loose else _WALK / (_WALK + chi2)
+        weighted = W * share[:, None, None]
+        ones = np.tile(np.eye(6), (n - 1, 1, 1))
+        start = 6 * n + 6 * np.arange(n - 1)
+        system.add([(start, -ones), (start + 6, ones)], e, weighted)
+
+    def _observed(
+        self, X: Poses, planes: FloatArray, links: FloatArray, sights: FloatArray
+    ) -> FloatArray:
+        """Adds up what links and planes tell of each keyframe, its own axes."""
+        result = np.zeros((self._n, 6, 6))
+        if len(self._i):
+            _, Ji, Jj = self._link_terms(X)
+            W = self._omega * links[:, None, None]
+            np.add.at(result, self._i, np.swapaxes(Ji, 1, 2) @ W @ Ji)
+            np.add.at(result, self._j, np.swapaxes(Jj, 1, 2) @ W @ Jj)
+        if len(self._k):
+            _, J, _ = self._plane_terms(X, planes)
+            W = self._plane_omega * sights[:, None]
+            np.add.at(result, self._k, np.swapaxes(J, 1, 2) @ (J * W[:, :, None]))
+        return result
+
+
+def prior_sigmas(config: MapperConfig) -> FloatArray:
+    """Returns (6,) standard deviations of an arm's pose, with its mount's error."""
+    turn = np.deg2rad(np.hypot(config.arm_sigma_deg, config.mount_sigma_deg))
+    shift = np.hypot(config.arm_sigma, config.mount_sigma)
+    return np.array([turn] * 3 + [shift] * 3)
+
+
+def observed_directions(information: FloatArray, config: MapperConfig) -> FloatArray:
+    """Finds the directions that links and planes determine.
+
+    A direction is observed if the information cuts the arm's standard deviation along
+    it to `observed_ratio`.
+
+    Args:
+        information: (6, 6) of one keyframe, from links and planes.
+        config: Sigmas of arm and mount.
+
+    Returns:
+        (6, 6) projection on the observed directions, of steps in units of
+        `prior_sigmas`; symmetric.
+    """
+    sigma = prior_sigmas(config)
+    values, axes = np.linalg.eigh(information * np.outer(sigma, sigma))
+    kept = axes[:, values > 1.0 / config.observed_ratio**2 - 1.0]
+    return np.asarray(kept @ kept.T)
+
+
+def _information(sigma: float, sigma_deg: float) -> FloatArray:
+    turn = np.deg2rad(sigma_deg)
+    return np.diag([turn**-2.0] * 3 + [sigma**-2.0] * 3)
+
+
+def _tangents(planes: FloatArray) -> FloatArray:
+    """Returns (m, 3, 2) unit vectors across the normals."""
+    n = planes[:, :3]
+    other = np.eye(3)[np.argmin(np.abs(n), axis=1)]
+    first = np.cross(n, other)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(n, first)], axis=2)
+
+
+def _turn_planes(
+    planes: FloatArray, steps: FloatArray, middle: FloatArray
+) -> FloatArray:
+    """Turns planes about their foot below `middle` and moves them along the normal."""
+    if not len(planes):
+        return planes
+    n = planes[:, :3] + np.einsum("mia,ma->mi", _tangents(planes), steps[:, :2])
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    height = planes[:, 3] - planes[:, :3] @ middle + steps[:, 2]
+    return np.column_stack([n, height + n @ middle])

@@ -1,0 +1,248 @@
+"""What is taken from one frame: a grid of oriented points, planes and features."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydrake.math import RigidTransform
+
+from perception.config import MapConfig
+from perception.depth import CameraIntrinsics, usable_pixels
+from perception.mapping.config import MapperConfig
+from perception.mapping.frames import Frame
+from perception.planes import fit_plane, ransac_plane
+from perception.values import BoolArray, FloatArray, FrozenValue
+
+BLOCK = 8
+"""Pixels of a grid point's edge: the noise of its mean is a third of a pixel's."""
+_FILLED = 0.75
+"""Share of a block's pixels that must be usable."""
+_STEP = 0.02
+"""Neighbours in the grid farther apart than this share of depth share no surface."""
+_NOISE_RANGE = 0.7
+"""Range at which `MapperConfig.plane_threshold` holds, m; noise grows as its square."""
+_MOST_PLANES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneSight(FrozenValue):
+    """A plane as one keyframe sees it.
+
+    Attributes:
+        center: (3,) m, in C, mean of its points.
+        normal: (3,) unit, in C, towards the camera.
+        axes: (3, 2) unit, in C, in the plane.
+        sigma: Standard deviation of the distance, m.
+        tilt_sigma: (2,) rad, of the tilts of the two axes.
+        share: Of the keyframe's points.
+    """
+
+    center: FloatArray
+    normal: FloatArray
+    axes: FloatArray
+    sigma: float
+    tilt_sigma: FloatArray
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Features(FrozenValue):
+    """Corners with depth.
+
+    Attributes:
+        uv: (n, 2) px, column and row.
+        p_Cs: (n, 3) m, in C.
+        descriptors: (n, 32) uint8, ORB's.
+    """
+
+    uv: FloatArray
+    p_Cs: FloatArray
+    descriptors: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe(FrozenValue):
+    """What is kept of a frame; full pictures are not.
+
+    Attributes:
+        number: Of the frame, counted from 0.
+        time: s.
+        X_arm: Pose that the arm gave; None = unknown.
+        grid: Mean points.
+        planes: Largest first.
+        features: Corners.
+        depth_mm: (h, w) uint16, usable depth at every `stride`-th pixel, 0 = none.
+        color: (h, w, 3) uint8, RGB, the same pixels.
+    """
+
+    number: int
+    time: float
+    X_arm: RigidTransform | None
+    grid: "PointGrid"
+    planes: tuple[PlaneSight, ...]
+    features: Features
+    depth_mm: npt.NDArray[np.uint16]
+    color: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class PointGrid(FrozenValue):
+    """Mean points of blocks of pixels.
+
+    Attributes:
+        points: (h, w, 3) m, in C.
+        normals: (h, w, 3) unit, in C, towards the camera; 0 = unknown.
+        valid: (h, w) bool, has a point.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    valid: BoolArray
+
+
+def make_keyframe(
+    frame: Frame,
+    number: int,
+    features: Features,
+    intrinsics: CameraIntrinsics,
+    config: MapperConfig,
+) -> Keyframe:
+    """Takes from a frame what the mapper keeps of it.
+
+    Args:
+        frame: The frame.
+        number: Its number, counted from 0; also the seed of its planes.
+        features: Its corners.
+        intrinsics: Of the camera.
+        config: Thresholds and sigmas.
+    """
+    usable = usable_pixels(frame.depth_mm, MapConfig(max_range=config.max_range))
+    grid = make_grid(frame.depth_mm, usable, intrinsics)
+    thin = np.s_[:: config.stride, :: config.stride]
+    return Keyframe(
+        number=number,
+        time=frame.time,
+        X_arm=frame.X_WC,
+        grid=grid,
+        planes=tuple(see_planes(grid, config, number)),
+        features=features,
+        depth_mm=np.where(usable[thin], frame.depth_mm[thin], 0).astype(np.uint16),
+        color=frame.color[thin].copy(),
+    )
+
+
+def make_grid(
+    depth_mm: npt.NDArray[np.uint16], usable: BoolArray, intrinsics: CameraIntrinsics
+) -> PointGrid:
+    """Averages depth over blocks of pixels and finds normals between them.
+
+    Args:
+        depth_mm: (H, W) uint16, mm, 0 = no return.
+        usable: (H, W) bool, pixels to take.
+        intrinsics: Of the camera.
+    """
+    rows, columns = depth_mm.shape[0] // BLOCK, depth_mm.shape[1] // BLOCK
+    shape = (rows, BLOCK, columns, BLOCK)
+    cut = np.s_[: rows * BLOCK, : columns * BLOCK]
+    weight = usable[cut].reshape(shape)
+    count = weight.sum(axis=(1, 3))
+    total = np.where(weight, depth_mm[cut].reshape(shape), 0).sum(axis=(1, 3))
+    valid = count >= _FILLED * BLOCK * BLOCK
+    z = np.where(valid, total / np.maximum(count, 1) / 1000.0, 0.0)
+    middle = (BLOCK - 1) / 2.0
+    x = (BLOCK * np.arange(columns) + middle - intrinsics.cx) / intrinsics.fx * z
+    y = (BLOCK * np.arange(rows) + middle - intrinsics.cy)[:, None] / intrinsics.fy * z
+    points = np.stack([x, y, z], axis=2)
+    return PointGrid(points, _normals(points, valid), valid)
+
+
+def _normals(points: FloatArray, valid: BoolArray) -> FloatArray:
+    across, down = np.zeros_like(points), np.zeros_like(points)
+    across[:, 1:-1] = points[:, 2:] - points[:, :-2]
+    down[1:-1] = points[2:] - points[:-2]
+    known = valid.copy()
+    known[:, [0, -1]] = known[[0, -1]] = False
+    known[:, 1:-1] &= valid[:, 2:] & valid[:, :-2]
+    known[1:-1] &= valid[2:] & valid[:-2]
+    limit = 2.0 * BLOCK * _STEP * np.maximum(points[:, :, 2], 1e-6) / 4.0
+    known &= (np.abs(across[:, :, 2]) < limit) & (np.abs(down[:, :, 2]) < limit)
+    normals = np.cross(down, across)
+    normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-12)
+    normals *= np.where(np.sum(normals * points, axis=2) > 0, -1.0, 1.0)[:, :, None]
+    return np.where(known[:, :, None], normals, 0.0)
+
+
+def see_planes(grid: PointGrid, config: MapperConfig, seed: int) -> list[PlaneSight]:
+    """Finds the largest planes in a keyframe.
+
+    Args:
+        grid: Its points.
+        config: `plane_threshold`, `plane_share` and the sigmas are used.
+        seed: Of RANSAC's random triples.
+
+    Returns:
+        Up to three, the largest first.
+    """
+    points = grid.points[grid.valid].T
+    total = points.shape[1]
+    rng = np.random.default_rng(seed)
+    sights: list[PlaneSight] = []
+    while len(sights) < _MOST_PLANES and points.shape[1] >= config.plane_share * total:
+        typical = float(np.median(points[2])) / _NOISE_RANGE if points.size else 1.0
+        threshold = config.plane_threshold * max(1.0, typical**2)
+        found = ransac_plane(points, threshold=threshold, rng=rng)
+        if found is None:
+            break
+        _, inliers = found
+        share = np.count_nonzero(inliers) / total
+        if share < config.plane_share:
+            break
+        sights.append(_sight(points[:, inliers], share, config))
+        points = points[:, ~inliers]
+    return sights
+
+
+def _sight(points: FloatArray, share: float, config: MapperConfig) -> PlaneSight:
+    plane = fit_plane(points)
+    center = points.mean(axis=1)
+    normal = plane.normal * (-1.0 if plane.normal @ center > 0 else 1.0)
+    axes = np.linalg.svd(normal[None])[2][1:].T
+    spread = np.std(axes.T @ (points - center[:, None]), axis=1)
+    # Noise of neighbouring blocks is correlated: a quarter of them are independent.
+    noise = plane.rms / np.sqrt(points.shape[1] / 4.0)
+    return PlaneSight(
+        center=center,
+        normal=normal,
+        axes=axes,
+        sigma=float(np.hypot(noise, config.plane_sigma)),
+        tilt_sigma=np.hypot(
+            noise / np.maximum(spread, 1e-3), np.deg2rad(config.plane_sigma_deg)
+        ),
+        share=share,
+    )
+
+
+def find_features(
+    frame: Frame, intrinsics: CameraIntrinsics, config: MapperConfig
+) -> Features:
+    """Finds corners that have depth, spread over the picture, with ORB descriptors."""
+    grey = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY)
+    orb = cv2.ORB.create(nfeatures=config.features, fastThreshold=15, nlevels=4)
+    corners, descriptors = orb.detectAndCompute(grey, None)
+    if descriptors is None:
+        return Features(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 32), np.uint8))
+    uv = np.array([corner.pt for corner in corners])
+    column, row = np.rint(uv).astype(int).T
+    z = _median_depth(frame.depth_mm)[row, column] / 1000.0
+    seen = (z > 0) & (z <= config.max_range)
+    x = (uv[:, 0] - intrinsics.cx) / intrinsics.fx * z
+    y = (uv[:, 1] - intrinsics.cy) / intrinsics.fy * z
+    p_Cs = np.stack([x, y, z], axis=1)
+    return Features(
+        uv[seen], p_Cs[seen], np.asarray(descriptors)[seen].astype(np.uint8)
+    )
+
+
+def _median_depth(depth_mm: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
+    return np.asarray(cv2.medianBlur(depth_mm, 5)).astype(np.uint16)
