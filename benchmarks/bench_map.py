@@ -1,0 +1,190 @@
+"""The map accumulator on rendered walls and recordings, row by row of issue 6.
+
+`python benchmarks/bench_map.py [ROW ...] [--rate HZ]`; rows: textured, textured-no-arm,
+painted, window, blank, blank-no-arm, wrong-links, memory; without names all but memory.
+Sequences: 848 x 480 through the D435 model, 0.7 m from the wall, zig-zag of five rows
+over 2 x 2 m, seed 7. CPU is of the whole process, also what runs on a second core.
+"""
+
+import argparse
+import dataclasses
+import resource
+import time
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from perception.depth import CameraIntrinsics
+from perception.mapping.config import MapperConfig
+from perception.mapping.mapper import Mapper, MappingResult, NoMapError
+from perception.mapping.report import session_report
+from perception.mapping.sequences import SequenceConfig, WallKind, render_sequence
+
+SEED = 7
+ERRORS = {
+    "mount_error": 0.003,
+    "mount_error_deg": 0.3,
+    "base_shift": 0.005,
+    "base_shift_deg": 0.3,
+}
+ROWS = {
+    "textured": (WallKind.TEXTURED, {}, True),
+    "textured-no-arm": (WallKind.TEXTURED, {}, False),
+    "painted": (WallKind.PAINTED, ERRORS, True),
+    "window": (WallKind.WINDOW, ERRORS, True),
+    "blank": (WallKind.BLANK, ERRORS, True),
+    "blank-no-arm": (WallKind.BLANK, {}, False),
+    "wrong-links": (WallKind.TEXTURED, {}, True),
+    "memory": (WallKind.BLANK, {}, True),
+}
+CELL = 0.01
+"""Of the thickness, m."""
+DOUBLED = 0.008
+"""A 2 cm cell with points so far apart is doubled, m."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rows", nargs="*", default=list(ROWS)[:-1], choices=list(ROWS))
+    parser.add_argument("--rate", type=float, default=5.0, help="frames a second, Hz")
+    words = parser.parse_args()
+    for row in words.rows:
+        run_row(row, words.rate)
+
+
+def run_row(row: str, rate: float) -> None:
+    wall, errors, with_arm = ROWS[row]
+    config = SequenceConfig(wall=wall, rate=rate, **errors)
+    mapper = Mapper(CameraIntrinsics.from_stereo(config.stereo), MapperConfig())
+    truth, arm = {}, {}
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    cpu = 0.0
+    try:
+        for frame, X_WC in render_sequence(config, SEED):
+            truth[frame.time], arm[frame.time] = X_WC, frame.X_WC
+            start = time.process_time()
+            mapper.add(frame if with_arm else frame.replace(X_WC=None))
+            cpu += time.process_time() - start
+        if row == "wrong-links":
+            clean = mapper.finish()
+            spoil_links(mapper)
+        result = mapper.finish()
+    except NoMapError as error:
+        print(f"{row}: refused: {error}")
+        return
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    report = session_report(mapper, result)
+    placed, total = len(result.poses), len(truth)
+    print(f"{row}: {placed} of {total} frames, {len(mapper.keyframes)} keyframes")
+    if row == "wrong-links":
+        print(f"  ATE without the wrong links {ate(clean.poses, truth):.2f} mm")
+    print(
+        f"  ATE {ate(result.poses, truth):.2f} mm; arm's "
+        f"{ate(list(arm.items()), truth):.2f} mm; links {report['links']}, "
+        f"dropped {report['links_dropped']}"
+    )
+    print_surface(result)
+    if with_arm:
+        print_observed(mapper, result, truth, arm, report)
+    count = len(mapper.keyframes)
+    timing = report["timing"]
+    print(
+        f"  CPU a keyframe: {1e3 * timing['cpu_per_keyframe_s']:.0f} ms mean, "
+        f"{1e3 * timing['cpu_per_keyframe_p95_s']:.0f} ms p95, and "
+        f"{1e3 * timing['finish_cpu_s'] / count:.0f} ms for the last optimisation and "
+        f"fusion; all frames {1e3 * cpu / total:.0f} ms a frame; peak memory "
+        f"+{after - before:.0f} MB (renderer's included)"
+    )
+
+
+def spoil_links(mapper: Mapper) -> None:
+    """Moves every tenth link by 2 to 5 cm and 2 deg."""
+    rng = np.random.default_rng(SEED)
+    for index in range(0, len(mapper.links), 10):
+        shift = rng.choice([-1, 1], 3) * rng.uniform(0.02, 0.05, 3)
+        X = RigidTransform(RollPitchYaw(0.035, 0.0, -0.035), shift)
+        link = mapper.links[index]
+        mapper.links[index] = dataclasses.replace(link, X_ij=link.X_ij @ X)
+
+
+def ate(
+    poses: list[tuple[float, RigidTransform]], truth: dict[float, RigidTransform]
+) -> float:
+    """Root mean square distance, mm, after the best rigid motion (Horn, 1987)."""
+    p = np.array([X.translation() for _, X in poses])
+    q = np.array([truth[t].translation() for t, _ in poses])
+    p, q = p - p.mean(axis=0), q - q.mean(axis=0)
+    U, _, Vt = np.linalg.svd(p.T @ q)
+    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
+    away = p @ U @ sign @ Vt - q
+    return float(1e3 * np.sqrt(np.mean(np.sum(away**2, axis=1))))
+
+
+def print_surface(result: MappingResult) -> None:
+    """Prints thickness, doubled cells and bending of the wall's plane."""
+    fused = result.fused
+    p_VQs = fused.X_WV.inverse() @ fused.p_WQs
+    p_VQs = p_VQs[:, np.abs(p_VQs[2]) < 0.02]
+    x, y, z = p_VQs
+    _, index = np.unique(np.floor(p_VQs[:2] / CELL), axis=1, return_inverse=True)
+    means = np.bincount(index.ravel(), z) / np.bincount(index.ravel())
+    thick = np.diff(np.percentile(means, [5, 95]))[0]
+    _, index = np.unique(np.floor(p_VQs[:2] / 0.02), axis=1, return_inverse=True)
+    index = index.ravel()
+    high, low = np.full(index.max() + 1, -np.inf), np.full(index.max() + 1, np.inf)
+    np.maximum.at(high, index, z)
+    np.minimum.at(low, index, z)
+    # A quadric through the wall: how far it leaves its plane over 2 m.
+    terms = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
+    quadric = np.linalg.lstsq(terms, z, rcond=None)[0]
+    bend = terms[:, :3] @ quadric[:3]
+    within = (np.abs(x) < 1.0) & (np.abs(y) < 1.0)
+    print(
+        f"  wall at 1 cm cells: 5-95 % {1e3 * thick:.2f} mm; doubled 2 cm cells "
+        f"{np.mean(high - low > DOUBLED):.2%}; bending over 2 m "
+        f"{1e3 * np.ptp(bend[within]):.2f} mm; carved {fused.carved}"
+    )
+
+
+def print_observed(mapper, result, truth, arm, report) -> None:
+    """Prints the camera's errors to the wall before and after, and what was moved."""
+    by_arm = [arm[keyframe.time] for keyframe in mapper.keyframes]
+    # The best plane of the map that the arm's poses would make.
+    middles = np.array(
+        [X @ k.planes[0].center for X, k in zip(by_arm, mapper.keyframes, strict=True)]
+    )
+    normal = np.linalg.svd(middles - middles.mean(axis=0))[2][2]
+    normal *= np.sign(normal[2])
+    before = plane_errors(
+        mapper, by_arm, [*normal, normal @ middles.mean(axis=0)], truth
+    )
+    seen = np.bincount([s.plane for s in mapper.sightings])
+    plane = result.estimate.planes[int(np.argmax(seen))]
+    after = plane_errors(mapper, result.keyframe_poses, plane, truth)
+    for name, unit, old, new in zip(
+        ("tilt to the wall", "distance to it"),
+        ("deg", "mm"),
+        before,
+        after,
+        strict=True,
+    ):
+        print(f"  {name}: {old:.3f} -> {new:.3f} {unit}, {1 - new / old:+.0%} better")
+    print(f"  observed in keyframes: {report['observed_share']}")
+    print(f"  corrected (rms): {report['correction_rms']}")
+
+
+def plane_errors(mapper, poses, plane, truth) -> tuple[float, float]:
+    errors = []
+    for keyframe, X_WC in zip(mapper.keyframes, poses, strict=True):
+        X_true = truth[keyframe.time]
+        seen = X_WC.rotation().inverse() @ np.array(plane[:3])
+        true = X_true.rotation().inverse() @ np.array([0.0, 0.0, 1.0])
+        tilt = np.degrees(np.arctan2(np.linalg.norm(np.cross(seen, true)), seen @ true))
+        away = np.array(plane[:3]) @ X_WC.translation() - plane[3]
+        errors.append([tilt, 1e3 * (away - X_true.translation()[2])])
+    tilt, away = np.sqrt(np.mean(np.square(errors), axis=0))
+    return float(tilt), float(away)
+
+
+if __name__ == "__main__":
+    main()

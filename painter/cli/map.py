@@ -1,0 +1,153 @@
+"""`painter map`: a recorded RGB-D sequence to poses and a map."""
+
+import dataclasses
+import json
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from painter.cli.common import (
+    JsonOption,
+    OutOption,
+    output_folder,
+    print_result,
+    progress,
+)
+from painter.errors import InputError
+from perception.depth import CameraIntrinsics
+from perception.mapping.config import MapperConfig
+from perception.mapping.frames import Frame, open_recording, write_poses
+from perception.mapping.fusion import write_map, write_mesh
+from perception.mapping.mapper import Mapper
+from perception.mapping.report import session_report
+from perception.mapping.session import run_session
+from perception.mapping.store import MapStore
+
+MAP_SUFFIX = ".db"
+
+
+def map(
+    frames: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FRAMES",
+            help="Folder in TUM RGB-D form or of numbered frames, or a map file (.db) "
+            "whose keyframes are mapped again.",
+        ),
+    ],
+    out: OutOption,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Poses of the arm in TUM form, camera in world.  [default: arm.txt or "
+            "the numbered pose files]",
+        ),
+    ] = None,
+    use_poses: Annotated[
+        bool, typer.Option(help="Use the poses of the recording, if it has any.")
+    ] = True,
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.db",
+            help="Keep the session in this file; one that was broken off goes on.",
+        ),
+    ] = None,
+    mesh: Annotated[bool, typer.Option(help="Write mesh.ply as well.")] = False,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Set a mapping value in SI units, e.g. mapping.cell=0.01; repeatable.",
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Map a recorded RGB-D sequence: correct its poses and fuse one surface.
+
+    Writes poses.txt (TUM form), map.ply (normals, colours, counts, variances), map.json
+    (frames, links, corrections, observed directions, timings) and, if wanted, mesh.ply.
+    """
+    config = mapper_config(overrides)
+    with ExitStack() as stack:
+        intrinsics, source, total = _source(stack, frames, poses, use_poses)
+        session = None
+        if store is not None:
+            if store.resolve() == frames.resolve():
+                raise InputError(f"--store {store}: is the map file to be replayed.")
+            session = stack.enter_context(MapStore(store))
+            session.start(intrinsics, config)
+        mapper = Mapper(intrinsics, config)
+        show = stack.enter_context(progress("mapping"))
+        result = run_session(
+            mapper,
+            source,
+            session,
+            lambda number: show(number / total, f"frame {number + 1} of {total}"),
+        )
+        report = session_report(mapper, result)
+        folder = stack.enter_context(output_folder(out))
+        write_poses(folder / "poses.txt", result.poses)
+        write_map(folder / "map.ply", result.fused)
+        if mesh:
+            report["triangles"] = write_mesh(folder / "mesh.ply", result.fused)
+        text = json.dumps(report, indent=2, allow_nan=False)
+        (folder / "map.json").write_text(text + "\n")
+    print_result(report, as_json=as_json)
+    if not as_json:
+        typer.echo(f"written to {out}")
+
+
+def mapper_config(overrides: list[str] | None) -> MapperConfig:
+    """Makes the settings.
+
+    Args:
+        overrides: Words of the form mapping.KEY=VALUE.
+
+    Raises:
+        InputError: A word has another form, an unknown key or a value out of bounds.
+    """
+    defaults = dataclasses.asdict(MapperConfig())
+    kinds = {name: type(value) for name, value in defaults.items()}
+    values: dict[str, Any] = {}
+    for word in overrides or ():
+        key, equals, text = word.partition("=")
+        name = key.removeprefix("mapping.")
+        if not equals or name not in kinds:
+            known = ", ".join(kinds)
+            raise InputError(
+                f"--set {word}: expected mapping.KEY=VALUE, KEY of {known}."
+            )
+        try:
+            values[name] = kinds[name](text)
+        except ValueError:
+            raise InputError(f"--set {word}: {text!r} is no number.") from None
+    config = MapperConfig(**values)
+    try:
+        config.validate()
+    except ValueError as error:
+        raise InputError(f"--set: {error}") from error
+    return config
+
+
+def _source(
+    stack: ExitStack, path: Path, poses: Path | None, use_poses: bool
+) -> tuple[CameraIntrinsics, Iterable[Frame], int]:
+    """Returns the camera, the frames and their number."""
+    if path.suffix != MAP_SUFFIX:
+        recording = open_recording(path, poses=poses, use_poses=use_poses)
+        return recording.intrinsics, recording.frames(), len(recording.entries)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file.")
+    old = stack.enter_context(MapStore(path))
+    if old.intrinsics is None or not len(old):
+        raise InputError(f"{path}: holds no keyframes.")
+    frames = (frame for _, frame, _, _ in old.keyframes())
+    if not use_poses:
+        frames = (frame.replace(X_WC=None) for frame in frames)
+    return old.intrinsics, frames, len(old)
