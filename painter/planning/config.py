@@ -79,6 +79,35 @@ class TipConfig:
 
 
 @dataclasses.dataclass(kw_only=True)
+class ZoneConfig:
+    """A piece of the tile that the operator marks.
+
+    Attributes:
+        kind: "exclude": stays clean; "include": nothing outside such zones is painted.
+        corners: x, y of its corners in T, m: at least three, or two opposite ones of a
+            rectangle.
+    """
+
+    kind: str = "exclude"
+    corners: list[list[float]] = dataclasses.field(default_factory=list)
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        if self.kind not in ("exclude", "include"):
+            raise ValueError(
+                f'raster.zones: kind must be "exclude" or "include", got {self.kind!r}.'
+            )
+        if len(self.corners) < 2 or not all(
+            len(corner) == 2 and all(math.isfinite(value) for value in corner)
+            for corner in self.corners
+        ):
+            raise ValueError(
+                "raster.zones: corners must be two or more pairs x, y, got "
+                f"{self.corners!r}."
+            )
+
+
+@dataclasses.dataclass(kw_only=True)
 class RasterConfig:
     """Strokes of a tile.
 
@@ -96,6 +125,8 @@ class RasterConfig:
             wall beside edges; False = the raster alone.
         cut_in_standoff: Nearest stand-off of such strokes, m; the fan is narrower by
             as much. None are made where it is not below `standoff`.
+        direction: Of the strokes; "vertical" alone can be.
+        zones: What the operator wants painted or left.
     """
 
     speed: float = 0.6
@@ -107,10 +138,20 @@ class RasterConfig:
     wall_share: float = 0.5
     cut_in: bool = True
     cut_in_standoff: float = 0.12
+    direction: str = "vertical"
+    zones: list[ZoneConfig] = dataclasses.field(default_factory=list)
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
         check_positive("raster", speed=self.speed, standoff=self.standoff)
+        if self.direction != "vertical":
+            raise ValueError(
+                'raster.direction must be "vertical": the fan\'s long axis is '
+                "horizontal, fixed by how the gun is bolted on, and an arm of five "
+                f"joints cannot roll it; got {self.direction!r}."
+            )
+        for zone in self.zones:
+            zone.validate()
         if not 0.08 <= self.cut_in_standoff < 1.0:
             raise ValueError(
                 "raster.cut_in_standoff must be 0.08 to 1 m, got "

@@ -17,6 +17,7 @@ from painter.planning.film_fit import FilmFit, Span
 from painter.planning.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
 from painter.planning.stroke_lines import nominal_pitch, place_lines, wall_share
+from painter.planning.zones import in_zones
 from perception.values import BoolArray, FloatArray
 
 # Of a line of the raster, before it is fitted: most of the flow that may land on what
@@ -62,7 +63,8 @@ def plan_strokes(
         raise ValueError(
             f"mask must be 2-D bool, got {mask.ndim}-D {mask.dtype} instead."
         )
-    paintable = _keep_off(mask, round(raster.keepout_margin / cell, 6))
+    marked = in_zones(mask, cell, raster.zones)
+    paintable = _keep_off(marked, round(raster.keepout_margin / cell, 6))
     if not paintable.any():
         return ()
     lines = place_lines(paintable, cell, tip=tip, raster=raster)
