@@ -7,6 +7,9 @@ import numpy as np
 from perception.values import BoolArray, FloatArray, FrozenValue, IntArray
 
 NOTHING = -1  # Label of a cell without a point; 0 is a point of no plane.
+# Depths are summed in these steps, m: 2^53 of them, as many as a float counts exactly,
+# are the depths of a million points 2 m from the wall.
+_QUANTUM = 2.0**-32
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +32,19 @@ def label_grid(
 ) -> LabelGrid:
     """Gives each cell the label and depth of its point closest to the mean depth.
 
-    Equations 4 and 5 of the paper are misprinted and read as follows. Equation 4
-    compares the root of X + Y of a point with that of a cell, which is no distance (and
-    would collect whole diagonals of the tile); the text says "all available points
-    belonging to each 1 x 1 cm pixel", so a cell collects the points above its square,
-    left and lower edge included: every point belongs to one cell. (The bound
-    0.01 sqrt(2) / 2 is the radius of the circle around that square; circles would
-    overlap.) Equation 5 gives Z2d(x, y) = X(i*); the text says that the cell inherits
-    "the Z axis for the selected point", so it is Z(i*).
+    Equations 4 and 5 of the paper are misprinted and read as follows.
+
+    - Equation 4 compares the square roots of X + Y of a point and of GX + GY of a cell.
+      These are no distances: x + y is the same along whole diagonals of the tile, and
+      its root is not even real left of the origin. Squares under the roots, making
+      them distances from the origin, would collect rings. The length of the offset,
+      |(X - GX, Y - GY)| <= 0.01 sqrt(2) / 2, is the circle around the cell's square,
+      and such circles overlap. The text says "all available points belonging to each
+      1 x 1 cm pixel": so a cell collects the points above its square, left and lower
+      edge included, and every point belongs to one cell.
+    - Equation 5 gives Z2d(x, y) = X(i*); the text says that the cell inherits "the
+      Z axis for the selected point", so it is Z(i*). The mean of Z is over the cell's
+      points of all labels, and a cell without a point has neither label nor depth.
 
     Of two points equally close to the mean, the one nearer to the robot counts (the gun
     meets it first), then the one of the smaller label; so the grid does not depend on
@@ -56,21 +64,21 @@ def label_grid(
     """
     cells, shape = _cells_of(p_TQs, width=width, height=height, cell=cell)
     index = np.flatnonzero(cells >= 0)
-    z, tags = p_TQs[2, index], labels[index]
-    # In this order the sums below, and so the grid, are the same for any input order.
-    order = np.lexsort((tags, -z, cells[index]))
-    own, z, tags = cells[index][order], z[order], tags[order]
-    grid_labels = np.full(shape[0] * shape[1], NOTHING, dtype=np.int64)
-    grid_depth = np.full(grid_labels.size, np.nan)
-    if own.size:
-        starts = np.flatnonzero(np.diff(own, prepend=-1))
-        counts = np.diff(starts, append=own.size)
-        means = np.add.reduceat(z, starts) / counts
-        off = np.abs(z - np.repeat(means, counts))
-        # Stable: among equals the one that the first sort put first.
-        chosen = np.lexsort((off, own))[starts]
-        grid_labels[own[starts]] = tags[chosen]
-        grid_depth[own[starts]] = z[chosen]
+    own, z, tags = cells[index], p_TQs[2, index], labels[index]
+    size = shape[0] * shape[1]
+    grid_labels = np.full(size, NOTHING, dtype=np.int64)
+    grid_depth = np.full(size, np.nan)
+    # Sums of whole quanta are exact, so the means are the same for any input order.
+    sums = np.bincount(own, weights=np.rint(z / _QUANTUM), minlength=size)
+    means = sums / np.maximum(1, np.bincount(own, minlength=size)) * _QUANTUM
+    off = np.abs(z - means[own])
+    least = np.full(size, np.inf)
+    np.minimum.at(least, own, off)
+    closest = np.flatnonzero(off == least[own])
+    # Few are equally close: the last that is written to a cell stays.
+    order = closest[np.lexsort((-tags[closest], z[closest]))]
+    grid_labels[own[order]] = tags[order]
+    grid_depth[own[order]] = z[order]
     return LabelGrid(grid_labels.reshape(shape), grid_depth.reshape(shape), cell)
 
 

@@ -7,10 +7,13 @@ import numpy as np
 
 from perception.values import BoolArray, FloatArray, FrozenValue, IntArray
 
-# Points on which a candidate plane is scored; the share of inliers is then known to
+# Points on which candidate planes are scored; the share of inliers is then known to
 # about 1 %, enough to rank candidates, and the refit on all inliers does the rest.
 _SCORE_POINTS = 4000
-_BATCH = 64
+# Of each batch, only the best on fewer points are scored on so many.
+_FIRST_POINTS = 500
+_FINALISTS = 16
+_BATCH = 256
 _MAX_CANDIDATES = 1024
 _CONFIDENCE = 0.99
 _MAX_REFITS = 5
@@ -67,8 +70,10 @@ def ransac_plane(
     """Finds the plane that most points are close to.
 
     Planes through random triples are ranked by their inliers among a random sample of
-    the points, until one more good triple would have come with 99 % probability. The
-    best is refitted to all its inliers and these are selected anew, until they stay.
+    the points, until one of inliers alone has come with 99 % probability: p = 0.99 in
+    equation 3, with v, the share of outliers, from the best plane so far, and m = 3.
+    The best is refitted to its inliers in that sample, these are selected anew until
+    they stay the same, and the last fit is to all inliers of the cloud.
 
     Source: Fischler and Bolles, "Random sample consensus", 1981; Tadic et al., 2021,
     equations 2 and 3.
@@ -79,14 +84,17 @@ def ransac_plane(
         rng: Source of the triples.
 
     Returns:
-        The plane and its inliers (N,), or None if all points lie on one line.
+        The plane and its inliers (N,), the points within `threshold` of it; or None if
+        all points lie on one line.
     """
     count = p_WQs.shape[1]
     if count < 3:
         return None
-    sample = p_WQs
+    # In random order, so that the first of them are a sample too.
     if count > _SCORE_POINTS:
         sample = p_WQs[:, rng.integers(count, size=_SCORE_POINTS)]
+    else:
+        sample = p_WQs[:, rng.permutation(count)]
     best_score, best = 0, None
     tried, needed = 0, float(_MAX_CANDIDATES)
     while tried < needed:
@@ -94,16 +102,22 @@ def ransac_plane(
         tried += _BATCH
         if offsets.size == 0:
             continue
-        close = np.abs(normals @ sample - offsets[:, None]) <= threshold
-        scores = np.count_nonzero(close, axis=1)
+        first = _scores(normals, offsets, sample[:, :_FIRST_POINTS], threshold)
+        final = np.argsort(-first, kind="stable")[:_FINALISTS]
+        normals, offsets = normals[final], offsets[final]
+        scores = _scores(normals, offsets, sample, threshold)
         top = int(scores.argmax())
         if scores[top] > best_score:
             best_score, best = int(scores[top]), (normals[top], offsets[top])
             needed = _candidates_needed(best_score / sample.shape[1])
     if best is None:
         return None
-    inliers = np.abs(best[0] @ p_WQs - best[1]) <= threshold
-    return _refit(p_WQs, inliers, threshold)
+    inliers = np.abs(best[0] @ sample - best[1]) <= threshold
+    plane = _refit(sample, inliers, threshold)
+    inliers = np.abs(plane.distances(p_WQs)) <= threshold
+    if np.count_nonzero(inliers) >= 3:
+        plane = fit_plane(p_WQs[:, inliers])
+    return plane, np.abs(plane.distances(p_WQs)) <= threshold
 
 
 def segment_planes(
@@ -130,16 +144,16 @@ def segment_planes(
         for a point of none; and the planes.
     """
     labels = np.zeros(p_WQs.shape[1], dtype=np.int64)
-    rest = np.arange(labels.size)
+    rest, points = np.arange(labels.size), p_WQs
     planes: list[Plane] = []
     while len(planes) < max_planes and rest.size >= stop_fraction * labels.size:
-        found = ransac_plane(p_WQs[:, rest], threshold=threshold, rng=rng)
+        found = ransac_plane(points, threshold=threshold, rng=rng)
         if found is None:
             break
         plane, inliers = found
         planes.append(plane)
         labels[rest[inliers]] = len(planes)
-        rest = rest[~inliers]
+        rest, points = rest[~inliers], points[:, ~inliers]
     return labels, tuple(planes)
 
 
@@ -165,9 +179,16 @@ def _candidates_needed(share: float) -> float:
     return min(_MAX_CANDIDATES, math.log(1.0 - _CONFIDENCE) / math.log1p(-hit))
 
 
-def _refit(
-    points: FloatArray, inliers: BoolArray, threshold: float
-) -> tuple[Plane, BoolArray]:
+def _scores(
+    normals: FloatArray, offsets: FloatArray, points: FloatArray, threshold: float
+) -> IntArray:
+    """Counts the inliers (M,) of planes, normals (M, 3), among (3, N) points."""
+    close = np.abs(normals @ points - offsets[:, None]) <= threshold
+    scores: IntArray = np.count_nonzero(close, axis=1)
+    return scores
+
+
+def _refit(points: FloatArray, inliers: BoolArray, threshold: float) -> Plane:
     """Fits to the inliers and selects them anew until they stay the same."""
     for _ in range(_MAX_REFITS):
         plane = fit_plane(points[:, inliers])
@@ -175,4 +196,4 @@ def _refit(
         if np.array_equal(again, inliers) or np.count_nonzero(again) < 3:
             break
         inliers = again
-    return plane, inliers
+    return plane

@@ -47,17 +47,14 @@ def euclidean_clusters(grid: LabelGrid, *, tolerance: float) -> IntArray:
         for dx in range(-reach, reach + 1)
         if (dy, dx) > (0, 0) and (dy, dx) not in _NEIGHBOURS
     ]
-    numbers = np.arange(seen.size)
+    numbers = np.arange(seen.size).reshape(seen.shape)
     # Most cells hang together by their neighbours already; from then on only the few
     # links between two clusters matter.
     for offsets in (list(_NEIGHBOURS), farther):
         pairs = [np.zeros((2, 0), dtype=np.int64)]
-        for offset in offsets:
-            a, b = _links(grid, offset, tolerance)
-            a, b = numbers[a], numbers[b]
-            pairs.append(np.stack([a, b])[:, a != b])
+        pairs += [_links(grid, numbers, offset, tolerance) for offset in offsets]
         numbers = _components(np.concatenate(pairs, axis=1), seen.size)[numbers]
-    clusters = np.where(seen, numbers.reshape(seen.shape), -1)
+    clusters = np.where(seen, numbers, -1)
     clusters[seen] = _ranks(clusters[seen])
     return clusters
 
@@ -189,18 +186,20 @@ def _tiny(regions: IntArray, *, min_area: float, cell: float) -> BoolArray:
 
 
 def _links(
-    grid: LabelGrid, offset: tuple[int, int], tolerance: float
-) -> tuple[IntArray, IntArray]:
-    """Returns the pairs of cells at an offset that have one label and are close."""
+    grid: LabelGrid, numbers: IntArray, offset: tuple[int, int], tolerance: float
+) -> IntArray:
+    """Returns the (2, M) pairs of clusters that cells at an offset link.
+
+    Linked are cells of one label that are close to one another, depth included.
+    """
+    number_a, number_b = _moved(numbers, offset)
     label_a, label_b = _moved(grid.labels, offset)
     depth_a, depth_b = _moved(grid.depth, offset)
+    apart = np.nonzero((number_a != number_b) & (label_a == label_b))
     across = math.hypot(*offset) * grid.cell
     # A comparison with NaN, where nothing was seen, is False.
-    close = np.hypot(across, depth_a - depth_b) <= tolerance + 1e-9
-    close &= label_a == label_b
-    numbers = np.arange(grid.labels.size).reshape(grid.labels.shape)
-    cell_a, cell_b = _moved(numbers, offset)
-    return cell_a[close], cell_b[close]
+    close = np.hypot(across, depth_a[apart] - depth_b[apart]) <= tolerance + 1e-9
+    return np.stack([number_a[apart][close], number_b[apart][close]])
 
 
 def _moved(grid: Grid, offset: tuple[int, int]) -> tuple[Grid, Grid]:
