@@ -22,6 +22,7 @@ COMMANDS = {
     "segment": "Segment a recorded cloud or depth image into wall and rest.",
     "map": "Map a recorded RGB-D sequence: poses and one surface.",
     "plan": "Plan the paint program of a segmented wall.",
+    "place": "Propose where the base stands to paint a tile or a wall.",
     "drives": "Run simulated CiA 402 drives on a CAN interface.",
     "report": "Rebuild the report page of a run.",
 }

@@ -1,0 +1,101 @@
+"""`painter place`: where the base stands to paint a tile or a wall."""
+
+import json
+import re
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from painter.cli.common import (
+    JsonOption,
+    OutOption,
+    SetOption,
+    output_folder,
+    print_result,
+)
+from painter.config import load_scenario
+from painter.diagrams.reach_map import ReachMapper
+from painter.errors import InputError
+from painter.planning.facade import plan_stations
+from painter.planning.placement import propose_distance
+
+STATIONS_FILE = "stations.json"
+_DISTANCES = np.round(np.arange(0.80, 1.46, 0.05), 3)  # m
+_STEP = 0.1  # m, between the points of the tile that are looked at.
+
+
+def place(
+    out: OutOption,
+    wall: Annotated[
+        str,
+        typer.Option(metavar="WxH", help="Width and height of the wall, m."),
+    ] = "2x2",
+    scenario: Annotated[
+        str,
+        typer.Option(help="Robot, tip and settings: a named scenario or a YAML file."),
+    ] = "blank",
+    overrides: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Propose where the base stands to paint a wall, from what the arm reaches.
+
+    A wall larger than a tile becomes a sequence of stations whose strokes blend. Writes
+    stations.json: distance of the wall, and of each station base position, lift, tile
+    and strokes.
+
+    Raises:
+        InputError: The wall is not given as two lengths, or too small to be divided.
+    """
+    job = load_scenario(scenario, overrides or ())
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)", wall)
+    if found is None or not min(map(float, found.groups())) > 0.0:
+        raise InputError(f"--wall {wall!r}: expected WxH in metres, e.g. 10x6.")
+    mapper = ReachMapper(job)
+    height = mapper.arm.shoulder_height
+    spot = propose_distance(
+        lambda distance: mapper.reach(
+            distance=distance, shoulder_height=height, step=_STEP
+        ),
+        _DISTANCES.tolist(),
+    )
+    try:
+        stations = plan_stations(
+            float(found[1]),
+            float(found[2]),
+            tile=job.tile,
+            tip=job.gun.tip,
+            raster=job.raster,
+        )
+    except ValueError as error:
+        raise InputError(f"--wall {wall!r}: {error}") from error
+    document = {
+        "units": "m, on the wall from its lower left corner; strokes in T",
+        "distance": spot.distance,
+        "stations": [
+            {
+                "base_x": station.base_x,
+                "lift": station.lift,
+                "tile": [station.left, station.bottom, station.width, station.height],
+                "strokes": [
+                    [*stroke.start_T.tolist(), *stroke.end_T.tolist(), stroke.flow]
+                    for stroke in station.strokes
+                ],
+            }
+            for station in stations
+        ],
+    }
+    with output_folder(out) as folder:
+        (folder / STATIONS_FILE).write_text(json.dumps(document, indent=1) + "\n")
+    print_result(
+        {
+            "distance": spot.distance,
+            "distance_range": [spot.nearest, spot.farthest],
+            "spray_share": spot.spray_share,
+            "scan_share": spot.scan_share,
+            "stations": len(stations),
+            "base_x": sorted({round(station.base_x, 3) for station in stations}),
+            "lift": sorted({round(station.lift, 3) for station in stations}),
+        },
+        as_json=as_json,
+    )
