@@ -136,3 +136,27 @@ def test_missing_file_is_exit_2(tmp_path, capsys):
     words = ["segment", str(tmp_path / "no.ply"), "--out", str(tmp_path / "out")]
     assert run(words) == 2
     assert "no.ply: no such file" in capsys.readouterr().err
+
+
+def test_viewpoint_turns_the_wall_round(cloud, tmp_path):
+    words = ["segment", str(cloud), "--out", str(tmp_path / "out"), "--cell", "0.02"]
+    assert run([*words, "--viewpoint", "0,0,5"]) == 0
+    figures = json.loads((tmp_path / "out" / "segmentation.json").read_text())
+    assert figures["seen_from"] == "given"
+    np.testing.assert_allclose(figures["wall_normal"], [0.0, 0.0, 1.0], atol=1e-3)
+    # From behind, the box low on the left is a recess low on the right.
+    mask = load_segmentation(tmp_path / "out" / "segmentation.npz").wall_mask
+    assert not mask[20:55, 70:85].any()
+
+
+def test_folder_of_depth_images_is_fused_with_the_camera_beside_it(tmp_path):
+    for number, depth in enumerate((700, 700, 3000)):
+        image = np.full((120, 160), depth, dtype=np.uint16)
+        Image.fromarray(image).save(tmp_path / f"depth_{number}.png")
+    camera = {"width": 160, "height": 120, "fx": 80, "fy": 80, "cx": 80, "cy": 60}
+    (tmp_path / "intrinsics.json").write_text(json.dumps(camera))
+    assert run(["segment", str(tmp_path), "--out", str(tmp_path / "out")]) == 0
+    figures = json.loads((tmp_path / "out" / "segmentation.json").read_text())
+    assert figures["wall_distance_m"] == pytest.approx(0.7)
+    # 159 x 119 pixels of 0.7 / 80 m.
+    assert figures["wall_area_m2"] == pytest.approx(1.39 * 1.04, rel=0.03)
