@@ -6,7 +6,7 @@ stops all axes, closes the gun and latches the reason until `acknowledge`.
 """
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -70,6 +70,8 @@ class ArmBus:
         self._guard = SetpointGuard(self._joints, bus.timeouts.setpoint)
         self.phase = Phase.DOWN
         self.reason = ""
+        # Called right before each SYNC, to take its time.
+        self.before_sync: Callable[[], None] | None = None
         self._buffer = SetpointBuffer()
         self._ramp: StopRamp | None = None
         self._q, self._v = np.zeros(5), np.zeros(5)
@@ -171,6 +173,8 @@ class ArmBus:
         if self._is_cyclic and not self._is_lost:
             self._count_missing()
             self._counts["cycles"] += 1
+            if self.before_sync is not None:
+                self.before_sync()
             self._send(Frame(SYNC_ID))
             self._follow(now)
             self._send_outputs()

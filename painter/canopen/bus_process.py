@@ -24,7 +24,7 @@ from painter.canopen.bus_config import BusConfig
 from painter.canopen.feedback import Feedback, Phase
 from painter.canopen.links import open_link
 from painter.canopen.mailbox import Mailbox
-from painter.canopen.realtime import Lateness, Ticker, use_fifo
+from painter.canopen.realtime import Lateness, Ticker, settle_memory, use_fifo
 from painter.canopen.setpoints import Setpoint
 from painter.errors import BusError, PainterError
 
@@ -66,6 +66,7 @@ class BusLoop:
         self._commands = commands
         self._mailbox = mailbox
         self._ticker = Ticker(bus.cycle)
+        self._master.before_sync = self._ticker.note
         self._refusal = ""
         self._lateness: Lateness | None = None
         self._is_fifo = False
@@ -74,6 +75,7 @@ class BusLoop:
     def run(self) -> None:
         """Runs until the other side asks to end, or is gone, and the arm is off."""
         self._is_fifo = use_fifo()
+        settle_memory()
         per_second = max(1, round(1.0 / self._ticker.period))
         count = 0
         while not self._has_ended():
@@ -83,8 +85,8 @@ class BusLoop:
                 if self._ticker.remaining() > 0.0:
                     self._pause()
             due, skipped = self._ticker.tick()
-            self._take_commands()
             self._master.cycle(due, overruns=skipped)
+            self._take_commands()
             count += 1
             if count % per_second == 0:
                 self._lateness = self._ticker.lateness()

@@ -1,5 +1,6 @@
 """Ways to a bus: any python-can interface, or a socket on this machine."""
 
+import select
 import socket
 import struct
 from collections.abc import Callable
@@ -177,7 +178,7 @@ class LocalLink:
     def receive(self, timeout: float) -> list[Frame]:
         """Returns frames that came; waits up to `timeout` s for the first one."""
         frames: list[Frame] = []
-        wait = max(timeout, 1e-6)
+        wait = max(timeout, 0.0)
         while len(frames) < _MOST_AT_ONCE:
             packet = self._do(partial(_receive, wait=wait))
             if packet is None:
@@ -204,11 +205,11 @@ class LocalLink:
 
 
 def _receive(link: socket.socket, *, wait: float) -> bytes | None:
-    link.settimeout(wait)
-    try:
-        packet = link.recv(64)
-    except (TimeoutError, BlockingIOError):
+    # select() waits to the microsecond; a socket's own time-out is whole milliseconds.
+    ready, _, _ = select.select([link], [], [], wait)
+    if not ready:
         return None
+    packet = link.recv(64)
     if not packet:
         raise ConnectionResetError(104, "the other side closed")
     return packet

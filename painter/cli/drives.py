@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from painter.canopen.bus_file import load_bus
+from painter.canopen.realtime import use_fifo
 from painter.canopen.sim.rack import Fault
 from painter.canopen.sim.server import RackServer
 from painter.canopen.units import AXES
@@ -15,6 +16,8 @@ from painter.cli.common import JsonOption, print_result
 from painter.errors import InputError
 from painter.resources import models_path
 
+# Below the bus process, which is at 60: real drives wait for no other program.
+_PRIORITY = 50
 _FAULT = re.compile(r"(?P<name>\w+)(?:@(?P<axis>\w+))?:(?P<time>[0-9.]+)")
 
 
@@ -60,6 +63,7 @@ def drives(
     )
     plan = sorted((_fault(word) for word in faults or ()), key=lambda item: item[0])
     server = RackServer(bus)
+    use_fifo(_PRIORITY)
     typer.echo(f"drives are on {bus.interface} {bus.channel}", err=True)
 
     def is_done(now: float) -> bool:

@@ -37,7 +37,9 @@ def wait_for(condition, what):
 @pytest.fixture
 def bus(tmp_path):
     bus = load_bus(models_path("bus", "painter.bus.yaml"))
-    bus = dataclasses.replace(bus, interface="local", channel=str(tmp_path / "can"))
+    bus = dataclasses.replace(
+        bus, interface="local", channel=str(tmp_path / "can"), cycle=0.02
+    )
     # Drives and bus share two cores with other tests: seconds, not milliseconds.
     bus.timeouts = dataclasses.replace(
         bus.timeouts, heartbeat=3.0, tpdo=2.0, setpoint=2.0, boot=20.0, sdo=2.0,
@@ -48,7 +50,6 @@ def bus(tmp_path):
 
 @pytest.fixture
 def drives(bus):
-    command = [sys.executable, "-m", "painter.cli.main", "drives", "--json"]
     code = "from painter.cli.main import main; main()"
     command = [sys.executable, "-c", code, "drives", "--json"]
     command += ["--interface", "local", "--channel", bus.channel]

@@ -11,6 +11,7 @@ from pathlib import Path
 from painter.canopen.bus_config import BusConfig
 from painter.canopen.frames import Frame
 from painter.canopen.links import Link, LinkError, open_link, pack_frame, unpack_frame
+from painter.canopen.realtime import settle_memory
 from painter.canopen.sim.rack import STEP, Rack
 
 _MOST_BEHIND = 0.1
@@ -118,6 +119,7 @@ class RackServer:
 
     def run(self, is_done: Callable[[float], bool]) -> None:
         """Runs until `is_done`, which is asked about every ms with the rack's time."""
+        settle_memory()
         while not is_done(self.rack.now):
             self._serve(self._now())
 
