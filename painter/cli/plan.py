@@ -106,37 +106,30 @@ def plan(
         checker = MakeCollisionChecker(job.directives, clearance=job.motion.clearance)
         show(0.4, "strokes and moves")
         start = time.perf_counter()
-        robot = {
-            "kinematics": GetArmKinematics(plant),
-            "limits": GetArmLimits(plant),
-            "checker": checker,
-        }
-        settings = {"tip": job.gun.tip, "raster": job.raster}
-        home = np.deg2rad(job.motion.home_deg)
+        tip, raster = job.gun.tip, job.raster
         film = _film_to_mend(wall, touch_up, mark, job)
+        mask = np.asarray(wall.wall_mask)
         if film is None:
+            height = np.asarray(wall.depth, dtype=np.float64)
             strokes = plan_strokes(
-                np.asarray(wall.wall_mask),
-                wall.cell,
-                height=np.asarray(wall.depth, dtype=np.float64),
-                **settings,
+                mask, wall.cell, tip=tip, raster=raster, height=height
             )
         else:
+            nominal = nominal_film(wall, tip=tip, raster=raster)
             strokes = touch_up_strokes(
-                film,
-                np.asarray(wall.wall_mask),
-                wall.cell,
-                nominal=nominal_film(wall, **settings),
-                **settings,
+                film, mask, wall.cell, nominal=nominal, tip=tip, raster=raster
             )
         program = program_of(
             strokes,
             wall,
-            home,
+            np.deg2rad(job.motion.home_deg),
+            kinematics=GetArmKinematics(plant),
+            limits=GetArmLimits(plant),
+            checker=checker,
+            tip=tip,
+            raster=raster,
             motion=job.motion,
             from_stroke=from_stroke,
-            **robot,
-            **settings,
         )
         compute_time = time.perf_counter() - start
         show(0.8, "files")
