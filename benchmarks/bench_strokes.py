@@ -1,87 +1,100 @@
-"""Coverage and overspray of planned strokes, by the closed form of the film.
+"""Strokes side by side: a plain raster, lines placed for edges, and cut in and fitted.
 
-Run `python benchmarks/bench_strokes.py`. The masks are exact and the gun is where it
-should be: what a simulated cycle gives is this less the errors of map, base and arm.
-Spray beyond the tile's edge is overspray too.
+Run `python benchmarks/bench_strokes.py [SCENE ...]`. The masks are exact and the gun is
+where it should be: what a simulated cycle gives is this less the errors of map, base
+and arm. Film is that of `FilmModel`, shaded by what stands out; spray beyond the tile's
+edge is overspray too. Time is the strokes' and the estimated moves' between them.
+
+The plain raster is the paper's way: evenly spaced lines, the gun open where its axis
+points at wall (Tadic et al. 2021).
 """
 
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from painter.planning.config import RasterConfig, TipConfig
-from painter.planning.deposition import mean_film, predicted_film
-from painter.planning.raster import plan_strokes
+from painter.planning.film_model import FilmModel, Site
+from painter.planning.raster import plan_strokes, raster_film
+from painter.planning.spray_path import Stroke
 from painter.planning.stroke_lines import nominal_pitch
-from painter.planning.tile import cell_centres
+from painter.planning.stroke_order import link_time, order_strokes
 from painter.scene.load import load_scene
 from painter.scene.surface import height_field, is_paintable
-from perception.values import BoolArray
+from perception.values import BoolArray, FloatArray
 
 CELL = 0.01
-MARGIN = 0.3
-OPENINGS = ((0.5, 0.6, 1.0, 1.2), (1.6, 0.2, 0.2, 0.2))
-CUBES = (
-    (0.25, 0.25),
-    (0.85, 0.35),
-    (1.55, 0.30),
-    (0.45, 0.95),
-    (1.15, 1.05),
-    (1.65, 1.45),
-    (0.65, 1.65),
-)
+SCENES = ("blank", "terrace", "room", "cubes", "obstacles")
+TIP = TipConfig()
+HOME_T = np.array([1.0, 1.0, 0.5])
 
 
 def main() -> None:
     """Prints the table."""
-    tips = {
-        "25 cm": TipConfig(),
-        "12 cm": TipConfig(fan_width=0.12, flow=7.28e-6),
+    ways: dict[str, Callable[[BoolArray, FloatArray], tuple[Stroke, ...]]] = {
+        "plain": plain,
+        "placed": lambda mask, height: planned(mask, height, cut_in=False),
+        "cut in": lambda mask, height: planned(mask, height, cut_in=True),
     }
-    print("fan    lead    mask       lines strokes  >=80 %  >=50 %    over    CV  plan")
-    for fan, tip in tips.items():
-        for lead in (0.0, 0.005, 0.01, 0.02):
-            for name, mask in masks().items():
-                print(f"{fan}  {lead:.3f} m {name:10}", row(mask, tip, lead))
-
-
-def masks() -> dict[str, BoolArray]:
-    """Returns the tiles: painting.md's, and the truth of the named scenes."""
-    cubes = [(x, y, 0.1, 0.1) for x, y in CUBES]
-    own = {"openings": _wall(OPENINGS), "seven": _wall(cubes)}
-    for scene in ("blank", "cubes", "obstacles", "room", "terrace"):
+    print("scene      way     strokes  time  >=80 %   over     CV  keep-out   plan")
+    for scene in sys.argv[1:] or SCENES:
         field = height_field(load_scene(scene, 1), cell=CELL)
-        own[scene] = is_paintable(field.kind)
-    return own
+        mask, height = is_paintable(field.kind), np.asarray(field.height)
+        for way, plan in ways.items():
+            start = time.process_time()
+            strokes = plan(mask, height)
+            elapsed = time.process_time() - start
+            print(f"{scene:10} {way:7} {row(mask, height, strokes)} {elapsed:5.2f} s")
 
 
-def row(mask: BoolArray, tip: TipConfig, lead: float) -> str:
-    """Plans a tile and returns its figures as text."""
-    raster = RasterConfig(lead=lead)
-    start = time.perf_counter()
-    strokes = plan_strokes(mask, CELL, tip=tip, raster=raster)
-    elapsed = time.perf_counter() - start
-    pitch = nominal_pitch(mask.shape[1] * CELL, tip=tip, raster=raster)
-    nominal = mean_film(tip, speed=raster.speed, pitch=pitch)
-    wide = np.pad(mask, round(MARGIN / CELL))
-    x, y = cell_centres(wide.shape, CELL, margin=MARGIN)
-    film = predicted_film(strokes, x, y, tip=tip)
-    on = film[wide] / nominal
-    lines = len({stroke.column for stroke in strokes})
+def plain(mask: BoolArray, height: FloatArray) -> tuple[Stroke, ...]:
+    """Returns evenly spaced strokes, open where the axis points at wall."""
+    raster = RasterConfig()
+    width = mask.shape[1] * CELL
+    pitch = nominal_pitch(width, tip=TIP, raster=raster)
+    strokes = []
+    for column in range(round(width / pitch)):
+        x_line = (column + 0.5) * pitch
+        on = mask[:, int(x_line / CELL)]
+        edges = np.flatnonzero(np.diff(on, prepend=False, append=False))
+        strokes += [
+            Stroke(
+                np.array([x_line, low * CELL]),
+                np.array([x_line, high * CELL]),
+                raster.speed,
+                "body",
+                column,
+            )
+            for low, high in edges.reshape(-1, 2)
+        ]
+    return tuple(strokes)
+
+
+def planned(mask: BoolArray, height: FloatArray, *, cut_in: bool) -> tuple[Stroke, ...]:
+    """Returns our strokes."""
+    raster = RasterConfig(cut_in=cut_in)
+    return plan_strokes(mask, CELL, tip=TIP, raster=raster, height=height)
+
+
+def row(mask: BoolArray, height: FloatArray, strokes: tuple[Stroke, ...]) -> str:
+    """Returns the figures of strokes as text."""
+    raster = RasterConfig()
+    site = Site.of_tile(mask, CELL, height)
+    nominal = raster_film(mask.shape[1] * CELL, tip=TIP, raster=raster)
+    model = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal)
+    film = model.film(strokes)
+    on, off = film[site.wanted], film[site.clean]
+    ordered = order_strokes(strokes, HOME_T, HOME_T)
+    spraying = sum(stroke.length / stroke.speed for stroke in ordered)
+    seconds = spraying + link_time(ordered, HOME_T, HOME_T)
+    soiled = f"{100 * np.mean(off >= 0.1):7.1f} %" if off.size else "        -"
     return (
-        f"{lines:5d} {len(strokes):7d} {100 * np.mean(on >= 0.8):7.1f} "
-        f"{100 * np.mean(on >= 0.5):7.1f} {100 * film[~wide].sum() / film.sum():7.1f} "
-        f"{100 * on.std() / on.mean():5.1f} {elapsed:4.2f} s"
+        f"{len(strokes):7d} {seconds:5.0f} s {100 * np.mean(on >= 0.8):5.1f} % "
+        f"{100 * (1.0 - on.sum() / film.sum()):4.1f} % "
+        f"{100 * on.std() / on.mean():4.1f} % {soiled}"
     )
-
-
-def _wall(keepouts: Sequence[tuple[float, ...]]) -> BoolArray:
-    mask = np.ones((200, 200), dtype=bool)
-    for x, y, width, height in keepouts:
-        rows = slice(round(y / CELL), round((y + height) / CELL))
-        mask[rows, round(x / CELL) : round((x + width) / CELL)] = False
-    return mask
 
 
 if __name__ == "__main__":

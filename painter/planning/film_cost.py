@@ -12,7 +12,7 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 _UNEVEN = 1.5  # A cell whose film is off by all of nominal.
 _SPILT = 0.9  # A cell's worth of paint that lands off the wall.
 _SOILED = 0.8  # All that stays clean soiled, as share of all wall bare ...
-_SOILED_MOST = 8.0  # ... and the most that one soiled cell counts.
+_SOILED_MOST = 11.0  # ... and the most that one soiled cell counts.
 _BEGUN = 0.002  # A stroke, m²: its turn and its valve ...
 _LENGTH = 0.001  # ... and a metre of it, m²: both cost time.
 
