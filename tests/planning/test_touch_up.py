@@ -5,7 +5,7 @@ import pytest
 
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.deposition import best_pitch, mean_film, predicted_film
-from painter.planning.program import program_of
+from painter.planning.program import program_of, strokes_from
 from painter.planning.spray_path import Stroke
 from painter.planning.tile import cell_centres
 from painter.planning.touch_up import marked_cells, touch_up_strokes
@@ -107,3 +107,23 @@ def test_touch_up_is_a_program_that_the_arm_can_do(robot, make_wall):
     assert len(dut.strokes) == len(strokes)
     assert dut.skipped == ()
     assert sorted(dut.motion.flow) == sorted(stroke.flow for stroke in strokes)
+
+
+@pytest.mark.parametrize("stopped_at", [1.7, 6.25, 15.9])
+def test_a_job_stopped_and_resumed_leaves_the_film_of_one_that_was_not(stopped_at):
+    whole = [
+        Stroke(np.array([x, 0.0]), np.array([x, 2.0]), 0.6, "body", number)
+        for number, x in enumerate((np.arange(16) + 0.5) * PITCH)
+    ]
+    rest = strokes_from(whole, stopped_at)
+    first = whole[: int(stopped_at) - 1]
+    broken = whole[int(stopped_at) - 1]
+    # What was sprayed of the broken stroke ends where the rest of it begins.
+    begun = broken.replace(end_T=rest[0].start_T)
+    x, y = cell_centres(SHAPE, CELL)
+    expected = predicted_film(whole, x, y, tip=TIP)
+    film = predicted_film([*first, begun], x, y, tip=TIP)
+    film = film + predicted_film(rest, x, y, tip=TIP)
+    np.testing.assert_allclose(film, expected, atol=1e-9 * NOMINAL)
+    share = (stopped_at % 1.0) * broken.length
+    assert begun.length == pytest.approx(share)
