@@ -24,7 +24,7 @@ _BASELINE = 0.050  # m; the left edge of a stereo depth image is blind for so mu
 _ROW_STEP = 0.01  # m, between the row heights that are tried.
 _POINT_STEP = 0.02  # m, between the places on a row that are looked at.
 _DISTANCE_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8)  # Of the scan distance, tried in turn.
-_LOOK_SPREAD = 0.3  # m, of first looks around the middle of a quarter,
+_LOOK_SPREAD = 0.1  # m, of first looks around the middle of a quarter,
 _LOOK_TICKS = 5  # and how many are tried in either direction.
 _SHORTEST_ROW = 0.05  # m; a row is a pass and a pass has a direction.
 
