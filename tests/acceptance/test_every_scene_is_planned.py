@@ -28,9 +28,7 @@ def robot():
     return {
         "kinematics": GetArmKinematics(plant),
         "limits": GetArmLimits(plant),
-        "checker": MakeCollisionChecker(
-            job.directives, clearance=job.motion.clearance
-        ),
+        "checker": MakeCollisionChecker(job.directives, clearance=job.motion.clearance),
     }
 
 
