@@ -1,5 +1,6 @@
 """The stage that parts the scanned wall into what to paint and what not."""
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context
 
@@ -58,7 +59,7 @@ class WallSegmenter(Stage):
         check_positive("wall_segmenter", width=width, height=height, period=period)
         config.validate()
         super().__init__(stage="wall_segmenter", period=period)
-        self._size = {"width": width, "height": height}
+        self._width, self._height = width, height
         self._config = config
         self._seed = seed
         # Inputs.
@@ -77,9 +78,10 @@ class WallSegmenter(Stage):
         return segment_wall(
             surface_map.p_WQs,
             wall.X_WT,
-            **self._size,
+            width=self._width,
+            height=self._height,
             config=self._config,
             seed=self._seed,
             counts=surface_map.counts,
-            variances=surface_map.variances,
+            variances=surface_map.variances.astype(np.float64),
         )
