@@ -39,7 +39,7 @@ def test_folder_holds_the_program(wall, tmp_path, capsys):
     words = ["plan", wall, "--out", str(out), "--set", "raster.speed=0.5", "--json"]
     assert run(words) == 0
     names = {path.name for path in out.iterdir()}
-    assert names == {"program.json", "trajectory.npz", "program.png"}
+    assert names == {"program.json", "trajectory.npz", "program.png", "film.png"}
     program = load_program(out)
     assert {stroke.speed for stroke in program.strokes} == {0.5}
     summary = json.loads(capsys.readouterr().out)

@@ -78,8 +78,8 @@ def test_only_timing_depends_on_the_clock(full_folder):
 def test_page_stands_alone(full_folder):
     finish(full_folder)
     page = page_of(full_folder)
-    # Map, regions, mask, strokes, film, histogram, timeline, tracking.
-    assert page.count("data:image/png;base64,") == 8
+    # Map, regions, mask, strokes, film, film as planned, histogram, timeline, tracking.
+    assert page.count("data:image/png;base64,") == 9
     assert not re.search(r'(?:src|href)="(?!data:)', page)
     assert "<script" not in page
     for info in FIGURES:
