@@ -1,3 +1,4 @@
+import os
 import shutil
 from pathlib import Path
 
@@ -9,7 +10,10 @@ from painter.canopen.device import Mode, read_device
 from painter.errors import InputError
 from painter.resources import models_path
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(os.environ.get("PAINTER_DATA", "../shared/data")) / "eds"
+pytestmark = pytest.mark.skipif(
+    not DATA.is_dir(), reason=f"no device descriptions in {DATA}; set PAINTER_DATA"
+)
 PAINTER = models_path("bus", "painter.bus.yaml")
 
 

@@ -1,5 +1,6 @@
 """Drives of three makers, made from their own EDS files, on one bus."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -15,7 +16,10 @@ from painter.canopen.sim.rack import Fault
 from painter.errors import InputError
 from painter.resources import models_path
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(os.environ.get("PAINTER_DATA", "../shared/data")) / "eds"
+pytestmark = pytest.mark.skipif(
+    not DATA.is_dir(), reason=f"no device descriptions in {DATA}; set PAINTER_DATA"
+)
 RPM = {"velocity_unit": "rpm", "acceleration_unit": "rpm/s"}
 # Counts a turn that keep the position of a joint's range in 32 bits, as all do.
 MAKERS = {
