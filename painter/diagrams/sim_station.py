@@ -40,6 +40,7 @@ from painter.diagrams.arm_model import (
     MakeArmPlant,
 )
 from painter.planning.tile import nominal_tile_pose
+from painter.scene.config import Scene
 from painter.scene.load import load_scene
 from painter.scene.sdf import scene_sdf, wall_pose
 from painter.scene.surface import height_field
@@ -80,13 +81,15 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(scenario.plant_config, builder)
     AddRobot(Parser(plant), scenario.directives)
-    _AddScene(plant, scenario)
+    scene = load_scene(scenario.scene, scenario.random_seed)
+    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+    _AddScene(plant, scene, X_WS)
     plant.Finalize()
     arm = plant.GetModelInstanceByName("arm")
     plant.SetDefaultPositions(arm, np.deg2rad(scenario.motion.home_deg))
     _AddDrives(builder, plant, scenario)
     camera = _AddWallCamera(builder, plant, scene_graph, scenario)
-    _AddGun(builder, plant, scenario, camera)
+    _AddGun(builder, plant, scenario, camera, scene, X_WS)
     _AddClearance(builder, plant, scene_graph)
     builder.ExportOutput(plant.get_state_output_port(arm), "cheat.state")
     if meshcat is not None:
@@ -102,9 +105,7 @@ def _SceneFiles() -> tempfile.TemporaryDirectory:
     return tempfile.TemporaryDirectory(prefix="painter-scene-")
 
 
-def _AddScene(plant: MultibodyPlant, scenario: Scenario) -> None:
-    scene = load_scene(scenario.scene, scenario.random_seed)
-    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+def _AddScene(plant: MultibodyPlant, scene: Scene, X_WS: RigidTransform) -> None:
     # Renderers and Meshcat read the mesh and picture of a textured wall later on.
     folder = tempfile.mkdtemp(dir=_SceneFiles().name)
     Parser(plant).AddModelsFromString(scene_sdf(scene, Path(folder)), "sdf")
@@ -259,10 +260,11 @@ def _AddGun(
     plant: MultibodyPlant,
     scenario: Scenario,
     camera: StereoCamera,
+    scene: Scene,
+    X_WS: RigidTransform,
 ) -> None:
     """Adds the paint film on the scene's true surface."""
     arm = plant.GetModelInstanceByName("arm")
-    scene = load_scene(scenario.scene, scenario.random_seed)
     surface = height_field(
         scene,
         cell=FILM_CELL,
@@ -276,7 +278,7 @@ def _AddGun(
             height=surface.height,
             cell=surface.cell,
             origin=surface.origin,
-            X_WS=wall_pose(scene, nominal_tile_pose(scenario.tile)),
+            X_WS=X_WS,
             tip=scenario.gun.tip,
         ),
     )
