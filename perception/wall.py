@@ -28,6 +28,7 @@ def find_wall(
     height: float,
     config: SegmentationConfig,
     seed: int,
+    up_W: FloatArray | None = None,
 ) -> Wall:
     """Finds the wall near where it is expected and lays the tile on it.
 
@@ -41,9 +42,10 @@ def find_wall(
         height: Of the tile, m, along T y.
         config: Thresholds.
         seed: Of RANSAC's random triples.
+        up_W: (3,) unit, against gravity; see `choose_plane`.
 
     Returns:
-        The wall; its T is as `tile_on_plane` lays it.
+        The wall; its T is as `wall_on_plane` lays it.
 
     Raises:
         NoWallError: There are too few points, or no plane is near the expected one.
@@ -64,6 +66,7 @@ def find_wall(
         height=height,
         total=p_WQs.shape[1],
         config=config,
+        up_W=up_W,
     )
     return wall_on_plane(
         planes[number],

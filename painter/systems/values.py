@@ -4,8 +4,14 @@ import enum
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from painter.planning.spray_path import Motion
-from perception.values import FrozenValue
+from perception.values import FloatArray, FrozenValue
+
+UP_W: FloatArray = np.array([0.0, 0.0, 1.0])
+"""Against gravity: the robot stands on a level floor, and W's z is up."""
+UP_W.flags.writeable = False
 
 
 class Phase(enum.Enum):

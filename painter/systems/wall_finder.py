@@ -6,6 +6,7 @@ from pydrake.systems.framework import Context
 
 from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
+from painter.systems.values import UP_W
 from perception.config import SegmentationConfig, check_positive
 from perception.values import SurfaceMap, Wall
 from perception.wall import find_wall
@@ -74,4 +75,5 @@ class WallFinder(Stage):
             **self._size,
             config=self._config,
             seed=self._seed,
+            up_W=UP_W,
         )

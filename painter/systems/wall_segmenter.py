@@ -7,7 +7,7 @@ from pydrake.systems.framework import Context
 from painter.errors import PainterError
 from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
-from painter.systems.values import StageResult
+from painter.systems.values import UP_W, StageResult
 from perception.config import SegmentationConfig, check_positive
 from perception.segmentation import segment_wall
 from perception.values import SurfaceMap, Wall, WallSegmentation
@@ -84,4 +84,5 @@ class WallSegmenter(Stage):
             seed=self._seed,
             counts=surface_map.counts,
             variances=surface_map.variances.astype(np.float64),
+            up_W=UP_W,
         )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 
 from painter.systems.values import StageRequest, StageResult
@@ -12,7 +12,9 @@ from perception.config import SegmentationConfig
 from perception.synthetic import synthetic_wall
 from perception.values import SurfaceMap, Wall
 
-X_WT_EXPECTED = RigidTransform([0.3, -0.2, 1.0])
+# A plumb wall across W x: T x = -W y, T y = W z, T z = -W x.
+PLUMB = RotationMatrix(np.array([[0.0, 0.0, -1], [-1, 0, 0], [0, 1, 0]]))
+X_WT_EXPECTED = RigidTransform(PLUMB, [1.0, 0.3, 0.2])
 
 
 def make_map(p_WQs):
@@ -20,9 +22,9 @@ def make_map(p_WQs):
     return SurfaceMap.empty().replace(p_WQs=p_WQs)
 
 
-def wall_map(offset=0.0):
+def wall_map(offset=0.0, X_WT=X_WT_EXPECTED):
     """A wall `offset` m before the expected one."""
-    X_WT = X_WT_EXPECTED @ RigidTransform([0.0, 0.0, offset])
+    X_WT = X_WT @ RigidTransform([0.0, 0.0, offset])
     rng = np.random.default_rng(0)
     return make_map(synthetic_wall([], spacing=0.02, X_WT=X_WT, rng=rng))
 
@@ -40,9 +42,9 @@ def make_finder(**changes):
     return WallFinder(**{**options, **changes})
 
 
-def answer(request, surface_map):
+def answer(request, surface_map, **changes):
     """The result after one look at a request."""
-    dut = make_finder()
+    dut = make_finder(**changes)
     simulator = Simulator(dut)
     context = simulator.get_mutable_context()
     dut.GetInputPort("request").FixValue(context, Value(request))
@@ -58,7 +60,7 @@ def test_wall_is_found_where_it_stands():
     assert result.error is None
     assert isinstance(result.value, Wall)
     np.testing.assert_allclose(
-        result.value.X_WT.translation(), [0.3, -0.2, 1.05], atol=1e-3
+        result.value.X_WT.translation(), [0.95, 0.3, 0.2], atol=1e-3
     )
 
 
@@ -68,6 +70,17 @@ def test_failure_is_a_result_with_its_reason():
     )
     assert result.value is None
     assert "NoWallError: the cloud has 5 finite points" in result.error
+
+
+def test_floor_is_no_wall_even_where_a_wall_is_expected():
+    level = RigidTransform([0.3, -0.2, 1.0])
+    result = answer(
+        StageRequest(number=1, stage="wall_finder"),
+        wall_map(X_WT=level),
+        X_WT_expected=level,
+    )
+    assert result.value is None
+    assert "level, as floors are" in result.error
 
 
 def test_requests_to_others_are_not_answered():

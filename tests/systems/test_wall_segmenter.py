@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 
 from painter.systems.values import StageRequest, StageResult
@@ -12,7 +12,9 @@ from perception.config import SegmentationConfig
 from perception.synthetic import Patch, synthetic_truth, synthetic_wall
 from perception.values import SurfaceMap, Wall, WallSegmentation
 
-X_WT = RigidTransform([0.3, -0.2, 1.0])
+# A plumb wall across W x: T x = -W y, T y = W z, T z = -W x.
+PLUMB = RotationMatrix(np.array([[0.0, 0.0, -1], [-1, 0, 0], [0, 1, 0]]))
+X_WT = RigidTransform(PLUMB, [1.0, 0.3, 0.2])
 BOX = Patch(0.4, 0.4, 0.8, 0.9, 0.1)
 REQUEST = StageRequest(number=2, stage="wall_segmenter")
 FOUND = StageResult(
