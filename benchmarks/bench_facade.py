@@ -11,16 +11,10 @@ import time
 import numpy as np
 
 from painter.config import load_scenario
-from painter.diagrams.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeArmPlant,
-    MakeCollisionChecker,
-)
+from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.errors import PainterError
 from painter.planning.deposition import mean_film, predicted_film
 from painter.planning.facade import Station, plan_stations
-from painter.planning.program import program_of
 from painter.planning.spray_path import Stroke
 from painter.planning.stroke_lines import nominal_pitch
 from painter.planning.tile import grid_shape, nominal_tile_pose
@@ -33,12 +27,7 @@ SIZES = ((2.0, 2.0), (5.0, 2.0), (10.0, 6.0))
 def main() -> None:
     """Prints a line for each size of wall."""
     job = load_scenario("blank")
-    plant = MakeArmPlant(job.directives)
-    robot = {
-        "kinematics": GetArmKinematics(plant),
-        "limits": GetArmLimits(plant),
-        "checker": MakeCollisionChecker(job.directives, clearance=job.motion.clearance),
-    }
+    planner = MakeProgramPlanner(job)
     shape = grid_shape(job.tile, CELL)
     wall = WallSegmentation(
         labels=np.ones(shape, dtype=np.uint16),
@@ -59,15 +48,8 @@ def main() -> None:
         painting = 0.0
         for number, station in enumerate(stations):
             try:
-                program = program_of(
-                    centred(station, job.tile.width),
-                    wall,
-                    home,
-                    tip=job.gun.tip,
-                    raster=job.raster,
-                    motion=job.motion,
-                    **robot,
-                )
+                strokes = centred(station, job.tile.width)
+                program = planner.program(strokes, wall, home)
             except PainterError as error:
                 print(f"station {number + 1}: {error}")
                 continue

@@ -103,15 +103,11 @@ class CycleConfig:
         unattended: True skips the operator's approval in REVIEW.
         period: Time between the brain's decisions, s.
         time_limit: Robot time after which a cycle that has not ended is a fault, s.
-        from_stroke: Number of the stroke that painting begins with, from 1: the
-            `next_stroke` of a job that was stopped; 12.4 begins where four tenths of
-            the twelfth are done.
     """
 
     unattended: bool = True
     period: float = 0.02
     time_limit: float = 600.0
-    from_stroke: float = 1.0
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -156,10 +152,6 @@ class Scenario:
                 raise ValueError(f"arm.gains.{name} must be >= 0, got {gain!r}.")
         check_positive("cycle", period=self.cycle.period)
         check_positive("cycle", time_limit=self.cycle.time_limit)
-        if not 1.0 <= self.cycle.from_stroke < math.inf:
-            raise ValueError(
-                f"cycle.from_stroke must be >= 1, got {self.cycle.from_stroke!r}."
-            )
         if not 8 <= self.arm.encoder_bits <= 32:
             raise ValueError(
                 f"arm.encoder_bits must be 8 to 32, got {self.arm.encoder_bits!r}."

@@ -15,17 +15,11 @@ from painter.cli.common import (
     print_result,
     progress,
 )
-from painter.config import Scenario, load_scenario
-from painter.diagrams.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeArmPlant,
-    MakeCollisionChecker,
-)
+from painter.config import load_scenario
+from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.errors import InputError
 from painter.planning.preview import preview_film
-from painter.planning.program import nominal_film, program_of
-from painter.planning.raster import plan_strokes
+from painter.planning.program import strokes_from
 from painter.planning.store import program_summary, save_program
 from painter.planning.tile import nominal_tile_pose
 from painter.planning.touch_up import marked_cells, touch_up_strokes
@@ -102,39 +96,30 @@ def plan(
         wall = wall.replace(X_WT=nominal_tile_pose(job.tile))
     with output_folder(out) as folder, progress("Plan") as show:
         show(0.0, "robot")
-        plant = MakeArmPlant(job.directives)
-        checker = MakeCollisionChecker(job.directives, clearance=job.motion.clearance)
+        planner = MakeProgramPlanner(job)
         show(0.4, "strokes and moves")
         start = time.perf_counter()
-        tip, raster = job.gun.tip, job.raster
-        film = _film_to_mend(wall, touch_up, mark, job)
-        mask = np.asarray(wall.wall_mask)
+        home = np.deg2rad(job.motion.home_deg)
+        nominal = planner.nominal_film(wall)
+        film = _film_to_mend(wall, touch_up, mark, nominal)
         if film is None:
-            height = np.asarray(wall.depth, dtype=np.float64)
-            strokes = plan_strokes(
-                mask, wall.cell, tip=tip, raster=raster, height=height
-            )
+            strokes = planner.strokes(wall)
         else:
-            nominal = nominal_film(wall, tip=tip, raster=raster)
             strokes = touch_up_strokes(
-                film, mask, wall.cell, nominal=nominal, tip=tip, raster=raster
+                film,
+                np.asarray(wall.wall_mask),
+                wall.cell,
+                nominal=nominal,
+                tip=planner.tip,
+                raster=planner.raster,
             )
-        program = program_of(
-            strokes,
-            wall,
-            np.deg2rad(job.motion.home_deg),
-            kinematics=GetArmKinematics(plant),
-            limits=GetArmLimits(plant),
-            checker=checker,
-            tip=tip,
-            raster=raster,
-            motion=job.motion,
-            from_stroke=from_stroke,
-        )
+        program = planner.program(strokes, wall, home)
+        if from_stroke != 1.0:
+            rest = strokes_from(program.strokes, from_stroke)
+            program = planner.program(rest, wall, home)
         compute_time = time.perf_counter() - start
         show(0.8, "files")
-        nominal = program.nominal_thickness
-        preview = preview_film(program.strokes, wall, tip=job.gun.tip, nominal=nominal)
+        preview = preview_film(program.strokes, wall, tip=planner.tip, nominal=nominal)
         save_program(folder, program, preview)
         (folder / PICTURE_FILE).write_bytes(png(stroke_picture(program, wall)))
         drawn = preview_picture(preview, wall, nominal)
@@ -154,7 +139,7 @@ def plan(
 
 
 def _film_to_mend(
-    wall: WallSegmentation, touch_up: Path | None, mark: str | None, job: Scenario
+    wall: WallSegmentation, touch_up: Path | None, mark: str | None, nominal: float
 ) -> FloatArray | None:
     """Returns the film (ny, nx), m, on the wall's grid; None = paint it all."""
     shape, cell = wall.wall_mask.shape, wall.cell
@@ -167,5 +152,4 @@ def _film_to_mend(
         marked = marked_cells(corners, shape, cell)
     except ValueError as error:
         raise InputError(f"--mark {mark!r}: {error}") from error
-    nominal = nominal_film(wall, tip=job.gun.tip, raster=job.raster)
     return np.where(marked, 0.0, nominal)

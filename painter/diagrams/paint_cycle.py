@@ -6,12 +6,7 @@ from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.config import Scenario
-from painter.diagrams.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeArmPlant,
-    MakeCollisionChecker,
-)
+from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.diagrams.station import MakeStation
 from painter.planning.tile import nominal_tile_pose
 from painter.systems.camera_pose import CameraPose
@@ -47,12 +42,11 @@ def MakeBrain(scenario: Scenario) -> Diagram:
         `program`.
     """
     builder = DiagramBuilder()
-    plant = MakeArmPlant(scenario.directives)
-    kinematics, limits = GetArmKinematics(plant), GetArmLimits(plant)
+    planner = MakeProgramPlanner(scenario)
     X_WT_expected = nominal_tile_pose(scenario.tile)
     period = scenario.cycle.period
     add = builder.AddNamedSystem
-    camera_pose = add("camera_pose", CameraPose(kinematics=kinematics))
+    camera_pose = add("camera_pose", CameraPose(kinematics=planner.kinematics))
     accumulator = add(
         "map_accumulator",
         MapAccumulator(
@@ -84,30 +78,22 @@ def MakeBrain(scenario: Scenario) -> Diagram:
             period=period,
         ),
     )
-    planning = {
-        "kinematics": kinematics,
-        "limits": limits,
-        "checker": MakeCollisionChecker(
-            scenario.directives, clearance=scenario.motion.clearance
-        ),
-        "tile": scenario.tile,
-        "motion": scenario.motion,
-        "period": period,
-    }
     mover = add(
         "motion_planner",
         MotionPlanner(
-            scan=scenario.scan, standoff=scenario.raster.standoff, **planning
+            kinematics=planner.kinematics,
+            limits=planner.limits,
+            checker=planner.checker,
+            tile=scenario.tile,
+            scan=scenario.scan,
+            motion=scenario.motion,
+            standoff=scenario.raster.standoff,
+            period=period,
         ),
     )
-    planner = add(
+    spray_planner = add(
         "spray_path_planner",
-        SprayPathPlanner(
-            tip=scenario.gun.tip,
-            raster=scenario.raster,
-            from_stroke=scenario.cycle.from_stroke,
-            **planning,
-        ),
+        SprayPathPlanner(planner=planner, tile=scenario.tile, period=period),
     )
     follower = add("path_follower", PathFollower(period=period))
     cycle = add(
@@ -117,10 +103,9 @@ def MakeBrain(scenario: Scenario) -> Diagram:
             period=period,
             look_time=scenario.scan.look_time,
             time_limit=scenario.cycle.time_limit,
-            from_stroke=scenario.cycle.from_stroke,
         ),
     )
-    stages = dict(zip(STAGES, (mover, finder, segmenter, planner), strict=True))
+    stages = dict(zip(STAGES, (mover, finder, segmenter, spray_planner), strict=True))
     # Pictures become the map.
     connect = builder.Connect
     connect(camera_pose.GetOutputPort("X_WC"), accumulator.GetInputPort("X_WC"))
@@ -133,13 +118,15 @@ def MakeBrain(scenario: Scenario) -> Diagram:
             accumulator.GetOutputPort("surface_map"), system.GetInputPort("surface_map")
         )
     # The map becomes a program.
-    connect(segmenter.GetOutputPort("result"), planner.GetInputPort("segmentation"))
+    connect(
+        segmenter.GetOutputPort("result"), spray_planner.GetInputPort("segmentation")
+    )
     for name, stage in stages.items():
         connect(cycle.GetOutputPort("request"), stage.GetInputPort("request"))
         connect(stage.GetOutputPort("result"), cycle.GetInputPort(name))
     # Plans begin where the arm was last told to be, not at its tracking error.
     desired_port = follower.GetOutputPort("desired_state")
-    for system in (mover, planner):
+    for system in (mover, spray_planner):
         connect(desired_port, system.GetInputPort("state"))
     connect(
         cycle.GetOutputPort("motion_command"), follower.GetInputPort("motion_command")
@@ -169,7 +156,7 @@ def MakeBrain(scenario: Scenario) -> Diagram:
     builder.ExportOutput(accumulator.GetOutputPort("surface_map"), "surface_map")
     builder.ExportOutput(wall_port, "wall")
     builder.ExportOutput(segmenter.GetOutputPort("result"), "segmentation")
-    builder.ExportOutput(planner.GetOutputPort("result"), "program")
+    builder.ExportOutput(spray_planner.GetOutputPort("result"), "program")
     diagram = builder.Build()
     diagram.set_name("brain")
     return diagram

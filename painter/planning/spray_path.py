@@ -38,6 +38,13 @@ class Stroke(FrozenValue):
         """Length on the wall, m."""
         return float(np.linalg.norm(self.end_T - self.start_T))
 
+    def part(self, begin: float, end: float) -> "Stroke":
+        """Returns its part between two shares of its length."""
+        travel = self.end_T - self.start_T
+        return self.replace(
+            start_T=self.start_T + begin * travel, end_T=self.start_T + end * travel
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Motion(FrozenValue):

@@ -152,7 +152,6 @@ class PaintCycle(LeafSystem):
         period: float,
         look_time: float,
         time_limit: float,
-        from_stroke: float = 1.0,
     ) -> None:
         """Creates the cycle.
 
@@ -161,13 +160,11 @@ class PaintCycle(LeafSystem):
             period: Time between decisions, s.
             look_time: How long the arm stands still for first sight, s.
             time_limit: A cycle that lasts longer is a fault, s.
-            from_stroke: Number of the stroke with which the planner begins.
         """
         super().__init__()
         self._unattended = unattended
         self._look_time = look_time
         self._time_limit = time_limit
-        self._from_stroke = from_stroke
         # Inputs.
         self._status_port = self.DeclareAbstractInputPort(
             "arm_status", Value(ArmStatus())
@@ -255,9 +252,7 @@ class PaintCycle(LeafSystem):
         painting = SEQUENCE[now.step].action == Action.PAINT and now.moving
         if not painting or follower.number != now.command.number:
             return now
-        done = follower.strokes_done
-        whole, begun = divmod(self._from_stroke, 1.0)
-        number = whole + (done if done >= 1.0 else begun + (1.0 - begun) * done)
+        number = 1.0 + follower.strokes_done
         if number == now.status.next_stroke:
             return now
         return now.replace(status=now.status.replace(next_stroke=number))

@@ -2,13 +2,11 @@
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.planning import CollisionChecker
 from pydrake.systems.framework import Context
 
 from painter.errors import PainterError
-from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
-from painter.planning.kinematics import ArmKinematics, ArmLimits
-from painter.planning.program import plan_program
+from painter.planning.config import TileConfig
+from painter.planning.program import ProgramPlanner
 from painter.planning.spray_path import PaintProgram
 from painter.planning.tile import grid_shape
 from painter.systems.ports import EvalAs
@@ -44,46 +42,26 @@ class SprayPathPlanner(Stage):
     def __init__(
         self,
         *,
-        kinematics: ArmKinematics,
-        limits: ArmLimits,
-        checker: CollisionChecker,
+        planner: ProgramPlanner,
         tile: TileConfig,
-        tip: TipConfig,
-        raster: RasterConfig,
-        motion: MotionConfig,
         period: float,
-        from_stroke: float = 1.0,
     ) -> None:
         """Creates the stage.
 
         Args:
-            kinematics: Of the arm.
-            limits: Of its joints.
-            checker: Of the robot's cell: arm, frame and floor.
+            planner: Of the robot and its settings.
             tile: Size that the segmentation must have.
-            tip: The spray tip.
-            raster: Settings of the strokes.
-            motion: Settings of the motion.
             period: Time between looks at the request, s.
-            from_stroke: Number of the stroke to begin with; see `plan_program`.
 
         Raises:
             ValueError: A setting is out of bounds.
         """
         check_positive("spray_path_planner", period=period)
-        for config in (tile, tip, raster, motion):
+        for config in (tile, planner.tip, planner.raster, planner.motion):
             config.validate()
         super().__init__(stage="spray_path_planner", period=period)
         self._tile = tile
-        self._settings = {
-            "kinematics": kinematics,
-            "limits": limits,
-            "checker": checker,
-            "tip": tip,
-            "raster": raster,
-            "motion": motion,
-            "from_stroke": from_stroke,
-        }
+        self._planner = planner
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 10)
         self._segmentation_port = self.DeclareAbstractInputPort(
@@ -104,4 +82,5 @@ class SprayPathPlanner(Stage):
                 f"{segmentation.wall_mask.shape} cells, the tile {shape}."
             )
         q0 = np.array(self._state_port.Eval(context)[:5])
-        return plan_program(segmentation, q0, **self._settings)
+        strokes = self._planner.strokes(segmentation)
+        return self._planner.program(strokes, segmentation, q0)

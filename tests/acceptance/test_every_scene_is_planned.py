@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from painter.config import load_scenario
-from painter.diagrams.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeArmPlant,
-    MakeCollisionChecker,
-)
+from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.diagrams.true_wall import true_segmentation
-from painter.planning.program import plan_program
 from painter.planning.tile import nominal_tile_pose
 from painter.planning.transfer import plan_transfer
 
@@ -22,18 +16,12 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def robot():
-    job = load_scenario("blank")
-    plant = MakeArmPlant(job.directives)
-    return {
-        "kinematics": GetArmKinematics(plant),
-        "limits": GetArmLimits(plant),
-        "checker": MakeCollisionChecker(job.directives, clearance=job.motion.clearance),
-    }
+def planner():
+    return MakeProgramPlanner(load_scenario("blank"))
 
 
 @pytest.mark.parametrize(("name", "seed"), NAMED + RANDOM)
-def test_program_is_whole_and_passes_its_verification(robot, name, seed):
+def test_program_is_whole_and_passes_its_verification(planner, name, seed):
     job = load_scenario(name, [f"random_seed={seed}"])
     wall = true_segmentation(job)
     # A map's edges are off by a cell and its heights by millimetres.
@@ -50,12 +38,12 @@ def test_program_is_whole_and_passes_its_verification(robot, name, seed):
             tile=job.tile,
             scan=job.scan,
             motion=job.motion,
-            **robot,
+            kinematics=planner.kinematics,
+            limits=planner.limits,
+            checker=planner.checker,
         )
         q = move.q[-1]
     # Raises if a limit, a clearance, a stand-off or an angle is not kept.
-    program = plan_program(
-        wall, q, tip=job.gun.tip, raster=job.raster, motion=job.motion, **robot
-    )
+    program = planner.program(planner.strokes(wall), wall, q)
     left_out = sum(item.stroke.length for item in program.skipped)
     assert left_out < 0.05 * sum(stroke.length for stroke in program.strokes)

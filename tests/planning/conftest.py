@@ -13,12 +13,13 @@ from painter.diagrams.arm_model import (
     MakeArmPlant,
     MakeCollisionChecker,
 )
-from painter.planning.config import MotionConfig, TileConfig
+from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
 from painter.planning.gun_path import SquareGun
 from painter.planning.joint_motion import planning_limits
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.linker import Linker
 from painter.planning.obstacles import ClearSpace, ObstacleBox, wall_box
+from painter.planning.program import ProgramPlanner
 from painter.planning.tile import nominal_tile_pose
 from perception.values import WallSegmentation
 
@@ -27,11 +28,20 @@ DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"
 
 @dataclasses.dataclass(frozen=True)
 class Robot:
-    """What planning knows of the robot; the fields are `plan_program`'s arguments."""
+    """What planning knows of the robot."""
 
     kinematics: ArmKinematics
     limits: ArmLimits
     checker: CollisionChecker
+
+    def planner(self, **settings) -> ProgramPlanner:
+        """A planner of programs with the default settings but for those given."""
+        defaults = {
+            "tip": TipConfig(),
+            "raster": RasterConfig(),
+            "motion": MotionConfig(),
+        }
+        return ProgramPlanner(**vars(self), **(defaults | settings))
 
     def linker(self, *boxes: ObstacleBox, X_WT: RigidTransform | None = None) -> Linker:
         """A linker before the expected wall, with `boxes` on it."""

@@ -8,7 +8,6 @@ from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipC
 from painter.planning.deposition import mean_film, predicted_film
 from painter.planning.facade import plan_stations
 from painter.planning.placement import propose_distance
-from painter.planning.program import program_of
 from painter.planning.reach_map import TileReach
 from painter.planning.stroke_lines import nominal_pitch
 
@@ -65,15 +64,8 @@ def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):
         s.replace(start_T=s.start_T + shift, end_T=s.end_T + shift)
         for s in station.strokes
     ]
-    dut = program_of(
-        strokes,
-        make_wall(),
-        np.deg2rad(MotionConfig().home_deg),
-        tip=TIP,
-        raster=RASTER,
-        motion=MotionConfig(),
-        **vars(robot),
-    )
+    home = np.deg2rad(MotionConfig().home_deg)
+    dut = robot.planner(tip=TIP, raster=RASTER).program(strokes, make_wall(), home)
     assert sum(s.length for s in dut.strokes) == pytest.approx(
         sum(s.length for s in strokes), rel=0.01
     )

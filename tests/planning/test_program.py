@@ -5,8 +5,8 @@ import pytest
 from pydrake.math import RigidTransform
 
 from painter.errors import InputError, MotionLimitError, ReachError
-from painter.planning.config import MotionConfig, RasterConfig, TipConfig
-from painter.planning.program import plan_program, program_of
+from painter.planning.config import MotionConfig
+from painter.planning.program import strokes_from
 from painter.planning.spray_path import Motion, Stroke
 from painter.planning.verify import verify_motion, verify_strokes
 
@@ -16,19 +16,11 @@ LOW_BOX = (slice(30, 45), slice(20, 40), 0.12)
 TALL_BOX = (slice(30, 45), slice(20, 40), 0.40)
 
 
-def plan(robot, wall, *, strokes=None, q0=HOME, **settings):
-    arguments = {
-        "kinematics": robot.kinematics,
-        "limits": robot.limits,
-        "checker": robot.checker,
-        "tip": TipConfig(),
-        "raster": RasterConfig(),
-        "motion": MotionConfig(),
-    }
-    arguments |= settings
-    if strokes is None:
-        return plan_program(wall, q0, **arguments)
-    return program_of(strokes, wall, q0, **arguments)
+def plan(robot, wall, *, strokes=None, q0=HOME):
+    planner = robot.planner()
+    return planner.program(
+        planner.strokes(wall) if strokes is None else strokes, wall, q0
+    )
 
 
 def gun_in_tile(robot, program, time):
@@ -152,24 +144,34 @@ def test_verification_finds_a_motion_that_is_too_fast(robot, program):
         )
 
 
-def test_program_from_a_stroke_on_is_the_rest_of_the_program(robot, make_wall):
+def covered(strokes):
+    """Lengths of wall that are sprayed, by line and stand-off."""
+    lengths = {}
+    for stroke in strokes:
+        key = round(float(stroke.start_T[0]), 6), stroke.standoff
+        lengths[key] = lengths.get(key, 0.0) + stroke.flow * stroke.length
+    return lengths
+
+
+def test_rest_of_a_program_sprays_what_is_not_done_yet(robot, make_wall):
     wall = make_wall((slice(60, 140), slice(0, 140), -0.1))
     whole = plan(robot, wall)
     # As a job is resumed that was stopped with a quarter of its third stroke done.
-    rest = plan(robot, wall, q0=HOME + 0.1, from_stroke=3.25)
-    assert len(rest.strokes) == len(whole.strokes) - 2
+    rest = strokes_from(whole.strokes, 3.25)
     first = whole.strokes[2]
     begin = 0.75 * first.start_T + 0.25 * first.end_T
-    np.testing.assert_allclose(rest.strokes[0].start_T, begin, atol=1e-9)
-    np.testing.assert_allclose(rest.strokes[0].end_T, first.end_T, atol=1e-9)
-    for dut, expected in zip(rest.strokes[1:], whole.strokes[3:], strict=True):
-        np.testing.assert_allclose(dut.start_T, expected.start_T, atol=1e-9)
-        np.testing.assert_allclose(dut.end_T, expected.end_T, atol=1e-9)
+    np.testing.assert_allclose(rest[0].start_T, begin, atol=1e-9)
+    np.testing.assert_allclose(rest[0].end_T, first.end_T, atol=1e-9)
+    dut = plan(robot, wall, strokes=rest, q0=HOME + 0.1)
+    assert dut.skipped == ()
+    done = [*whole.strokes[:2], first.replace(end_T=begin)]
+    assert covered([*done, *dut.strokes]) == pytest.approx(covered(whole.strokes))
 
 
 def test_there_must_be_such_a_stroke(robot, make_wall):
+    strokes = plan(robot, make_wall()).strokes
     with pytest.raises(InputError, match="from_stroke must be 1 to"):
-        plan(robot, make_wall(), from_stroke=99.0)
+        strokes_from(strokes, 99.0)
 
 
 def test_strokes_that_differ_in_flow_alone_follow_without_a_gap(robot, make_wall):

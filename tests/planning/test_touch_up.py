@@ -5,7 +5,7 @@ import pytest
 
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.deposition import best_pitch, mean_film, predicted_film
-from painter.planning.program import program_of, strokes_from
+from painter.planning.program import strokes_from
 from painter.planning.spray_path import Stroke
 from painter.planning.tile import cell_centres
 from painter.planning.touch_up import marked_cells, touch_up_strokes
@@ -95,15 +95,8 @@ def test_touch_up_is_a_program_that_the_arm_can_do(robot, make_wall):
     film = even_film()
     film[PATCH] = 0.0
     strokes, _ = mend(film)
-    dut = program_of(
-        strokes,
-        make_wall(),
-        np.deg2rad(MotionConfig().home_deg),
-        tip=TIP,
-        raster=RASTER,
-        motion=MotionConfig(),
-        **vars(robot),
-    )
+    home = np.deg2rad(MotionConfig().home_deg)
+    dut = robot.planner(tip=TIP, raster=RASTER).program(strokes, make_wall(), home)
     assert len(dut.strokes) == len(strokes)
     assert dut.skipped == ()
     assert sorted(dut.motion.flow) == sorted(stroke.flow for stroke in strokes)

@@ -4,35 +4,22 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from painter.diagrams.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeArmPlant,
-    MakeCollisionChecker,
-)
-from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
+from painter.config import Scenario
+from painter.diagrams.program_planner import MakeProgramPlanner
+from painter.planning.config import MotionConfig, TileConfig
 from painter.planning.spray_path import PaintProgram
 from painter.planning.tile import nominal_tile_pose
 from painter.systems.spray_path_planner import SprayPathPlanner
 from painter.systems.values import StageRequest, StageResult
 from perception.values import WallSegmentation
 
-DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"
 HOME = np.deg2rad(MotionConfig().home_deg)
 
 
 @pytest.fixture(scope="module")
 def planner():
-    plant = MakeArmPlant(DIRECTIVES)
     return SprayPathPlanner(
-        kinematics=GetArmKinematics(plant),
-        limits=GetArmLimits(plant),
-        checker=MakeCollisionChecker(DIRECTIVES, clearance=0.04),
-        tile=TileConfig(),
-        tip=TipConfig(),
-        raster=RasterConfig(),
-        motion=MotionConfig(),
-        period=0.1,
+        planner=MakeProgramPlanner(Scenario()), tile=TileConfig(), period=0.1
     )
 
 

@@ -1,0 +1,112 @@
+"""Strokes cut back to where the gun keeps clear and the arm reaches."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from painter.planning.linker import Linker
+from painter.planning.reach import require_reach
+from painter.planning.spray_path import SkippedStroke, Stroke
+from perception.values import BoolArray, FloatArray
+
+_STEP = 0.02  # m along a stroke, between the places that are looked at.
+# m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
+# the room in which the arm stops and turns at 0.6 m/s.
+_STOPPING = 0.12
+# Share of the strokes' length; if more is out of reach the arm stands in the wrong
+# place.
+_MOST_OUT_OF_REACH = 0.05
+
+
+def clear_strokes(
+    strokes: Sequence[Stroke], linker: Linker, min_stroke: float
+) -> tuple[list[Stroke], list[SkippedStroke]]:
+    """Cuts strokes back to what keeps clear.
+
+    Args:
+        strokes: In T.
+        linker: Knows reach and clearance.
+        min_stroke: Shorter ones are not kept, m.
+
+    Returns:
+        What stays, and what does not with the reason.
+
+    Raises:
+        ReachError: More than a twentieth of their length is out of the arm's reach.
+    """
+    if not strokes:
+        return [], []
+    counts = [max(2, int(np.ceil(stroke.length / _STEP)) + 1) for stroke in strokes]
+    shares = [np.linspace(0.0, 1.0, count) for count in counts]
+    # All at once: to ask for one place takes as long as to ask for fifty.
+    p_TGs = np.concatenate(
+        [
+            nozzle_points(
+                stroke.start_T + np.outer(share, stroke.end_T - stroke.start_T),
+                stroke.standoff,
+            )
+            for stroke, share in zip(strokes, shares, strict=True)
+        ]
+    )
+    q = linker.gun.solve(p_TGs)
+    reached = linker.limits.contains(q)
+    total = sum(stroke.length for stroke in strokes)
+    if np.count_nonzero(~reached) * _STEP > _MOST_OUT_OF_REACH * total:
+        outside = p_TGs[~reached]
+        require_reach(outside, gun=linker.gun, limits=linker.limits, what="strokes")
+    free = np.array(reached)
+    free[reached] = linker.space.free(q[reached])
+    clear: list[Stroke] = []
+    skipped: list[SkippedStroke] = []
+    ends = np.cumsum(counts)
+    for stroke, end, count in zip(strokes, ends, counts, strict=True):
+        rows = slice(end - count, end)
+        if free[rows].all():
+            clear.append(stroke)
+            continue
+        kept, lost = _cut_back(stroke, q[rows], free[rows], linker, min_stroke)
+        clear += kept
+        skipped += lost
+    return clear, skipped
+
+
+def nozzle_points(p_T: FloatArray, standoff: float) -> FloatArray:
+    """Returns nozzle positions (n, 3), m, over wall points (n, 2), in T."""
+    return np.column_stack([p_T, np.full(len(p_T), standoff)])
+
+
+def _cut_back(
+    stroke: Stroke, q: FloatArray, free: BoolArray, linker: Linker, min_stroke: float
+) -> tuple[list[Stroke], list[SkippedStroke]]:
+    """Returns what stays of a stroke that is free at some of evenly spaced places."""
+    share = np.linspace(0.0, 1.0, len(free))
+    room = _STOPPING / stroke.length
+    clear: list[Stroke] = []
+    skipped: list[SkippedStroke] = []
+    for first, last, is_free in _runs(free):
+        cut_start, cut_end = first > 0, last < len(free) - 1
+        if is_free:
+            begin = share[first] + room * cut_start
+            end = max(share[last] - room * cut_end, begin)
+        else:
+            begin = max(share[first] - room - share[1], 0.0) if cut_start else 0.0
+            end = min(share[last] + room + share[1], 1.0) if cut_end else 1.0
+        part = stroke.part(begin, end)
+        if is_free and part.length >= min_stroke:
+            clear.append(part)
+        elif is_free:
+            skipped.append(SkippedStroke(part, "shorter than raster.min_stroke"))
+        else:
+            middle = q[(first + last) // 2]
+            reached = linker.limits.contains(middle[None])[0]
+            blocked = linker.space.worst_pair(middle) if reached else None
+            skipped.append(SkippedStroke(part, blocked or "out of the arm's reach"))
+    return clear, skipped
+
+
+def _runs(free: BoolArray) -> list[tuple[int, int, bool]]:
+    """Returns (first, last, value) of each run of equal values."""
+    edges = np.flatnonzero(np.diff(free.astype(int))) + 1
+    firsts = [0, *edges.tolist()]
+    lasts = [*(edges - 1).tolist(), len(free) - 1]
+    return [(a, b, bool(free[a])) for a, b in zip(firsts, lasts, strict=True)]
