@@ -17,12 +17,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 from types import TracebackType
 
 from painter.canopen.arm_bus import ArmBus
 from painter.canopen.bus_config import BusConfig
 from painter.canopen.feedback import Feedback, Phase
-from painter.canopen.links import open_link
+from painter.canopen.frame_log import FrameLogger, TappedLink
+from painter.canopen.links import Link, open_link
 from painter.canopen.mailbox import Mailbox
 from painter.canopen.realtime import Lateness, Ticker, settle_memory, use_fifo
 from painter.canopen.setpoints import Setpoint
@@ -55,13 +57,26 @@ class Report:
 class BusLoop:
     """The loop that calls the master in real time; runs in the bus process."""
 
-    def __init__(self, bus: BusConfig, commands: Connection, mailbox: Mailbox) -> None:
+    def __init__(
+        self,
+        bus: BusConfig,
+        commands: Connection,
+        mailbox: Mailbox,
+        log: Connection | None = None,
+    ) -> None:
         """Connects to the bus.
+
+        Args:
+            bus: What is on the bus.
+            commands: Where commands come from.
+            mailbox: Where reports go.
+            log: Pipe of a `FrameLogger`, or None.
 
         Raises:
             PainterError: The link cannot be opened, or an EDS not be used.
         """
-        self._link = open_link(bus)
+        link = open_link(bus)
+        self._link: Link = link if log is None else TappedLink(link, log)
         self._master = ArmBus(bus, self._link)
         self._commands = commands
         self._mailbox = mailbox
@@ -156,25 +171,33 @@ class BusLoop:
 class BusProcess:
     """The diagram's side of the bus; a context manager that switches off at its end."""
 
-    def __init__(self, bus: BusConfig) -> None:
+    def __init__(self, bus: BusConfig, *, log: Path | None = None) -> None:
         """Starts the process; the bus itself is begun by `start`.
 
         Args:
             bus: What is on the bus.
+            log: Where to write all frames in candump's format, or None.
+
+        Raises:
+            InputError: The log cannot be written.
         """
+        self._logger = None if log is None else FrameLogger(log, bus.channel)
+        pipe = None if self._logger is None else self._logger.pipe
         context = multiprocessing.get_context("spawn")
         theirs, self._commands = context.Pipe(duplex=False)
         self._mailbox = Mailbox()
         self._errors, errors = context.Pipe(duplex=False)
         self._process = context.Process(
             target=_run,
-            args=(bus, theirs, self._mailbox.name, errors),
+            args=(bus, theirs, self._mailbox.name, errors, pipe),
             name="painter bus",
             daemon=False,
         )
         self._process.start()
         theirs.close()
         errors.close()
+        if pipe is not None:
+            pipe.close()  # So that the log ends when the bus process does.
 
     def __enter__(self) -> "BusProcess":
         return self
@@ -241,6 +264,8 @@ class BusProcess:
             self._process.join()
         self._commands.close()
         self._mailbox.close()
+        if self._logger is not None:
+            self._logger.close()
 
     def _send(self, word: str, argument: object = None) -> None:
         # A pipe that can be written to has room for 4096 bytes (POSIX: PIPE_BUF), and
@@ -263,13 +288,17 @@ class BusProcess:
 
 
 def _run(
-    bus: BusConfig, commands: Connection, mailbox_name: str, errors: Connection
+    bus: BusConfig,
+    commands: Connection,
+    mailbox_name: str,
+    errors: Connection,
+    log: Connection | None,
 ) -> None:
     """The bus process: Ctrl-C is the parent's business, which then ends the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     mailbox = Mailbox(name=mailbox_name)
     try:
-        BusLoop(bus, commands, mailbox).run()
+        BusLoop(bus, commands, mailbox, log).run()
     except PainterError as error:
         errors.send(str(error))
         os._exit(1)

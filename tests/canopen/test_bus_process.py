@@ -15,6 +15,7 @@ import pytest
 
 from painter.canopen.bus_file import load_bus
 from painter.canopen.bus_process import BusProcess
+from painter.canopen.candump import read_log
 from painter.canopen.feedback import Phase
 from painter.canopen.links import LinkError, LocalLink
 from painter.canopen.mailbox import Mailbox
@@ -159,8 +160,11 @@ def test_the_arm_stops_when_the_commanding_program_is_killed(bus, drives, tmp_pa
     assert out.count(b"SWITCH ON DISABLED") == 5
 
 
-def test_drives_stop_when_the_bus_process_is_killed(bus, drives):
-    dut = BusProcess(bus)
+def test_drives_stop_and_the_log_is_whole_when_the_bus_process_is_killed(
+    bus, drives, tmp_path
+):
+    log = tmp_path / "bus.log"
+    dut = BusProcess(bus, log=log)
     dut.start()
     wait_for(phase_is(dut, Phase.ENABLED), "not enabled")
     os.kill(dut.pid, signal.SIGKILL)
@@ -168,6 +172,11 @@ def test_drives_stop_when_the_bus_process_is_killed(bus, drives):
     with pytest.raises(BusError, match="has ended"):
         dut.report()
     dut.close()
+    frames = [record.frame for record in read_log(log).records]
+    enable = b"\x0f\0"  # Controlword of all five RPDOs.
+    enabled = {f.cob_id for f in frames if f.data[:2] == enable and f.cob_id < 0x300}
+    assert enabled >= {0x201, 0x202, 0x203, 0x204, 0x205}
+    assert log.read_text().endswith("\n")
     time.sleep(bus.timeouts.heartbeat + 0.5)  # The drives' own watch.
     drives.send_signal(signal.SIGINT)
     out, _ = drives.communicate(timeout=PATIENCE)

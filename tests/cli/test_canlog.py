@@ -1,0 +1,105 @@
+"""`painter canlog` on a log of simulated drives, written as the bus process does."""
+
+import json
+
+import numpy as np
+import pytest
+
+from painter.canopen.arm_bus import ArmBus
+from painter.canopen.bus_file import load_bus
+from painter.canopen.candump import LogRecord, format_record
+from painter.canopen.feedback import Phase
+from painter.canopen.setpoints import Setpoint
+from painter.canopen.sim.rack import Fault, Rack
+from painter.cli.main import run
+from painter.resources import models_path
+
+START = 1_700_000_000.0
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Bring-up, 0.5 s of motion, an emergency of the elbow's drive."""
+    path = tmp_path_factory.mktemp("canlog") / "bus.log"
+    bus = load_bus(models_path("bus", "painter.bus.yaml"))
+    rack, records = Rack(bus), []
+    rack.wire.attach(lambda frame, now: records.append(LogRecord(START + now, frame)))
+    master, fault_at, end, cycle = ArmBus(bus, rack.link), None, None, 0
+    master.start()
+    while end is None or cycle * bus.cycle < end:
+        now = cycle * bus.cycle
+        rack.advance(now)
+        if master.phase == Phase.ENABLED:
+            if end is None:
+                fault_at, end = now + 0.5, now + 0.7
+            moved = np.full(5, 0.05 * max(0.0, now - fault_at + 0.5))
+            speed = np.full(5, 0.05)
+            master.push([Setpoint(now + 0.005, moved + 0.05 * 0.005, speed, 0.0)])
+            if now >= fault_at:
+                rack.inject(Fault.EMCY, "elbow_pitch")
+        master.cycle(now)
+        for i in range(1, 5):
+            rack.advance(now + i * 1e-3)
+            master.poll(now + i * 1e-3)
+        cycle += 1
+    path.write_text("".join(format_record(r, "can0") + "\n" for r in records))
+    return path
+
+
+def test_changes_read_as_the_story_of_the_run(log, capsys):
+    assert run(["canlog", str(log), "--changes", "--node", "elbow_pitch"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    text = "\n".join(line.split(maxsplit=2)[2] for line in lines)
+    story = [
+        "reset node",
+        "boot-up",
+        "6060h mode := 8 CYCLIC SYNC POSITION",
+        "start",
+        "SHUTDOWN",
+        "READY TO SWITCH ON",
+        "SWITCHED ON",
+        "ENABLE OPERATION",
+        "OPERATION ENABLED",
+        "3220h DC link under-voltage",
+        "FAULT",
+    ]
+    at = 0
+    for word in story:
+        at = text.index(word, at)
+    assert len(lines) < 300  # Of thousands of frames.
+
+
+def test_figures_name_what_went_wrong(log, capsys):
+    assert run(["canlog", str(log), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["frames"] == len(log.read_text().splitlines())
+    assert found["sync_period_s"] == pytest.approx(0.005, abs=1e-6)
+    assert len(found["errors"]) == 1
+    assert "elbow_pitch emcy 3220h" in found["errors"][0]
+    # Five drives at 200 Hz, worst-case bits, second TPDOs every other cycle.
+    assert 0.2 < found["bus_load"] <= 0.4
+
+
+def test_only_what_is_asked_for_is_shown(log, capsys):
+    words = ["--kind", "sync", "--since", "0.5", "--until", "0.6"]
+    assert run(["canlog", str(log), *words]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 20
+    assert all(0.5 <= float(line.split()[0]) <= 0.6 for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["none.log"], "none.log: no such log"),
+        (["{log}", "--node", "knee"], "--node 'knee': known are base_yaw"),
+        (["{log}", "--bus", "none.yaml"], "none.yaml: no such bus file"),
+        (["{log}", "--kind", "pdo"], "--kind"),
+    ],
+)
+def test_wrong_use_is_one_line(log, capsys, words, text):
+    words = [word.format(log=log) for word in words]
+    assert run(["canlog", *words]) == 2
+    error = capsys.readouterr().err
+    assert text in error
+    assert len(error.splitlines()) == 1
