@@ -14,6 +14,7 @@ from painter.canopen.bus_config import BusConfig
 from painter.canopen.cia402 import Command
 from painter.canopen.drive_client import DriveClient
 from painter.canopen.feedback import Feedback, Phase, Statistics
+from painter.canopen.follower import SetpointFollower
 from painter.canopen.frames import (
     ERROR_BUS_OFF,
     HEARTBEAT_BASE,
@@ -23,13 +24,7 @@ from painter.canopen.frames import (
 from painter.canopen.io_client import IoClient
 from painter.canopen.links import Link, LinkError
 from painter.canopen.node_client import OPERATIONAL, NodeClient, Script, together
-from painter.canopen.setpoints import (
-    Sample,
-    Setpoint,
-    SetpointBuffer,
-    SetpointGuard,
-    StopRamp,
-)
+from painter.canopen.setpoints import Setpoint
 from painter.canopen.units import (
     AXES,
     FloatArray,
@@ -66,15 +61,17 @@ class ArmBus:
         self.io = IoClient(bus, self._send)
         self.nodes: list[NodeClient] = [*self.drives, self.io]
         self._by_id = {node.node_id: node for node in self.nodes}
-        self._joints = bus.joint_limits()
-        self._guard = SetpointGuard(self._joints, bus.timeouts.setpoint)
+        self._follower = SetpointFollower(
+            bus.joint_limits(), cycle=bus.cycle, timeout=bus.timeouts.setpoint
+        )
         self.phase = Phase.DOWN
         self.reason = ""
         # Called right before each SYNC, to take its time.
         self.before_sync: Callable[[], None] | None = None
-        self._buffer = SetpointBuffer()
-        self._ramp: StopRamp | None = None
-        self._q, self._v = np.zeros(5), np.zeros(5)
+        # Called with what all drives measured at a SYNC: its due time, q, v, trigger.
+        self.measured: Callable[[float, FloatArray, FloatArray, float], None] = (
+            lambda *sample: None
+        )
         self._script: Script | None = None
         self._is_cyclic = False  # SYNC runs and process data is watched.
         self._is_lost = False
@@ -99,6 +96,7 @@ class ArmBus:
 
     def start(self) -> None:
         """Begins bring-up: configure, verify, operational, enable, home."""
+        self._follower.release()
         self._begin(self._start_up(self.nodes))
 
     def acknowledge(self) -> None:
@@ -114,6 +112,7 @@ class ArmBus:
         if self.io.inputs is not None and not self.io.is_chain_closed:
             raise BusError("cannot acknowledge: the e-stop chain is open.")
         self.reason = ""
+        self._follower.release()
         self._begin(self._start_up([n for n in self.nodes if not self._is_sound(n)]))
 
     def push(self, points: Sequence[Setpoint]) -> None:
@@ -124,7 +123,7 @@ class ArmBus:
         """
         if self.phase != Phase.ENABLED:
             return
-        self._buffer.push(points)
+        self._follower.push(points)
 
     def stop(self, reason: str, *, quick: bool = False) -> None:
         """Stops all axes, closes the gun and latches the reason.
@@ -138,26 +137,23 @@ class ArmBus:
             self.reason = reason
             _LOGGER.warning("stopped: %s", reason)
         self.phase = Phase.STOPPED
-        self._buffer.clear()
         if self._script is not None:
             self._script.close()
             self._script = None
         if quick or was not in (Phase.ENABLED, Phase.STOPPED):
-            self._ramp = None
+            self._follower.release()
             for drive in self.drives:
                 drive.controlword = Command.QUICK_STOP
                 drive.target = drive.position
         elif was == Phase.ENABLED:
-            self._ramp = StopRamp(self._now, self._q, self._v, self._joints)
+            self._follower.brake(self._now)
         self._send_outputs()
 
     def shut_down(self) -> None:
         """Begins to switch off: ramp, brakes, power."""
         if self.phase in (Phase.ENABLED, Phase.STARTING):
             self.stop("switched off.")
-        ramp = self._ramp
-        self._begin(self._switch_off())
-        self._ramp = ramp
+        self._begin(self._switch_off(self._now + self._follower.braking_time))
 
     # Time.
 
@@ -171,6 +167,7 @@ class ArmBus:
         self.poll(now)
         self._counts["overruns"] += overruns
         if self._is_cyclic and not self._is_lost:
+            self._note_measured()
             self._count_missing()
             self._counts["cycles"] += 1
             if self.before_sync is not None:
@@ -211,20 +208,19 @@ class ArmBus:
 
     def feedback(self) -> Feedback:
         """Returns the state of the arm."""
-        axes = np.array([d.units.angle(d.position) for d in self.drives])
-        speeds = np.array([d.units.speed(d.velocity) for d in self.drives])
+        q, v = self._actual()
         return Feedback(
             time=self._now,
             phase=self.phase,
             reason=self.reason,
-            q=joints_from_axes(axes),
-            v=joints_from_axes(speeds),
-            q_commanded=self._q.copy(),
+            q=q,
+            v=v,
+            q_commanded=self._follower.q.copy(),
             trigger=self.io.trigger,
             axes=tuple(drive.status() for drive in self.drives),
             is_chain_closed=self.io.is_chain_closed,
             pressure=self.io.pressure,
-            buffered=len(self._buffer),
+            buffered=len(self._follower),
             statistics=Statistics(
                 **self._counts,
                 retries=sum(node.sdo.retry_count for node in self.nodes),
@@ -237,8 +233,6 @@ class ArmBus:
     def _begin(self, script: Script) -> None:
         if self._script is not None:
             self._script.close()
-        self._buffer.clear()
-        self._ramp = None
         self.phase = Phase.STARTING
         self._script = script
 
@@ -256,14 +250,7 @@ class ArmBus:
     def _start_up(self, nodes: Sequence[NodeClient]) -> Script:
         if nodes:
             self._is_cyclic = False  # No SYNC while PDOs are mapped.
-            scripts = []
-            for node in nodes:
-                config = node.config if isinstance(node, DriveClient) else None
-                restore, store = (
-                    (config.restore, config.store) if config else (False, False)
-                )
-                scripts.append(node.bring_up(restore=restore, store=store))
-            yield from together(scripts)
+            yield from together([node.bring_up() for node in nodes])
         for node in self.nodes:
             node.got_tpdo, node.missed, node.alarm = False, 0, None
             node.start()
@@ -282,17 +269,15 @@ class ArmBus:
         yield from together([drive.enable() for drive in self.drives])
         for drive in self.drives:
             yield from drive.home()
-        self._q = self._actual()
-        self._v = np.zeros(5)
+        self._follower.stand(self._actual()[0])
         self.phase = Phase.ENABLED
 
-    def _switch_off(self) -> Script:
+    def _switch_off(self, standing: float) -> Script:
+        """Waits until the arm stands, at a time, s; then brakes and power."""
         self.io.trigger = 0.0
-        if self._ramp is not None:
-            end = self._now + self._ramp.duration
-            while self._now < end:
-                yield
-            self._ramp = None
+        while self._now < standing:
+            yield
+        self._follower.release()
         if self._is_cyclic:
             yield from together([drive.disable() for drive in self.drives])
         self._is_cyclic = False
@@ -302,38 +287,29 @@ class ArmBus:
 
     def _follow(self, now: float) -> None:
         """Takes the command of this cycle to the drives."""
-        if self._ramp is not None:
-            self._command(self._ramp.sample(now))
+        follower = self._follower
+        if self.phase != Phase.ENABLED and not follower.is_braking:
             return
-        if self.phase != Phase.ENABLED:
-            return
-        cycle, sample = self._bus.cycle, self._buffer.sample(now)
-        if sample is None:
-            self._command(Sample(self._q, np.zeros(5), 0.0, 0.0))
-            return
-        if sample.lag > 0.0 and sample.is_active:
-            # Late, but not yet too late: go on as the last setpoint said.
-            moved = sample.q + sample.v * sample.lag
-            sample = Sample(moved, sample.v, sample.trigger, sample.lag)
-        elapsed = cycle if self._last_cycle is None else now - self._last_cycle
-        problem = self._guard.objection(sample, self._q, max(elapsed, cycle))
-        if problem:
+        elapsed = 0.0 if self._last_cycle is None else now - self._last_cycle
+        problem = follower.step(now, elapsed)
+        if problem is not None:
             self.stop(problem)
-            assert self._ramp is not None
-            sample = self._ramp.sample(now)
-        self._command(sample)
-
-    def _command(self, sample: Sample) -> None:
-        self._q = self._guard.clip(sample.q)
-        self._v = sample.v
-        self.io.trigger = sample.trigger
-        axes = axes_from_joints(self._q)
+            follower.step(now, elapsed)
+        self.io.trigger = follower.trigger
+        axes = axes_from_joints(follower.q)
         for drive, angle in zip(self.drives, axes, strict=True):
             drive.target = drive.units.counts(float(angle))
 
-    def _actual(self) -> FloatArray:
+    def _actual(self) -> tuple[FloatArray, FloatArray]:
+        """Positions and speeds of the joints as the drives last said."""
         axes = np.array([d.units.angle(d.position) for d in self.drives])
-        return joints_from_axes(axes)
+        speeds = np.array([d.units.speed(d.velocity) for d in self.drives])
+        return joints_from_axes(axes), joints_from_axes(speeds)
+
+    def _note_measured(self) -> None:
+        """Passes on what came after the last SYNC, if all of it did."""
+        if self._last_cycle is not None and all(d.got_tpdo for d in self.drives):
+            self.measured(self._last_cycle, *self._actual(), self.io.trigger)
 
     def _send_outputs(self) -> None:
         if not self._is_cyclic:
@@ -364,11 +340,11 @@ class ArmBus:
                     self.stop(alarm, quick=True)
         if self.phase not in (Phase.ENABLED, Phase.STOPPED) or not self._is_cyclic:
             return
-        held = self.phase == Phase.ENABLED or self._ramp is not None
+        held = self.phase == Phase.ENABLED or self._follower.is_braking
         complaint = first_complaint(
             self._bus, self.drives, self.io, now=now, must_be_enabled=held
         )
-        if complaint is not None and (self.phase == Phase.ENABLED or self._ramp):
+        if complaint is not None and held:
             self.stop(complaint, quick=True)
 
     def _is_sound(self, node: NodeClient) -> bool:

@@ -66,6 +66,8 @@ class DriveClient(NodeClient):
             timeouts=bus.timeouts,
             plan=plan_drive(bus, config, device, limits),
             profile=402,
+            restore=config.restore,
+            store=config.store,
         )
         mode = choose_mode(device)
         assert mode is not None  # plan_drive() refuses these.

@@ -54,6 +54,8 @@ class NodeClient:
         timeouts: Timeouts,
         plan: ConfigPlan,
         profile: int,
+        restore: bool = False,
+        store: bool = False,
     ) -> None:
         """Creates the client of a node.
 
@@ -65,6 +67,8 @@ class NodeClient:
             timeouts: The bus file's.
             plan: What is written to it.
             profile: Device profile in the low half of 1000h, e.g. 402.
+            restore: Whether it gets its defaults back before it is configured.
+            store: Whether it keeps its configuration.
         """
         self.name = name
         self.node_id = node_id
@@ -73,6 +77,7 @@ class NodeClient:
         self._identity = identity
         self._timeouts = timeouts
         self._profile = profile
+        self._restores, self._stores = restore, store
         self.sdo = SdoClient(
             name, node_id, send, timeout=timeouts.sdo, retries=timeouts.sdo_retries
         )
@@ -123,7 +128,7 @@ class NodeClient:
                 raise BusError(f"{self.name}: {failure} within {timeout:g} s.")
             yield
 
-    def bring_up(self, *, restore: bool, store: bool) -> Script:
+    def bring_up(self) -> Script:
         """Resets the node, checks who it is, and configures it.
 
         Raises:
@@ -131,12 +136,12 @@ class NodeClient:
         """
         yield from self._reset()
         yield from self._check_identity()
-        if restore:
+        if self._restores:
             yield from self.sdo.transfer(0x1011, 1, _LOAD)
             yield from self._reset()
         yield from self.check_device()
         yield from write_and_verify(self.name, self.sdo, self.plan)
-        if store:
+        if self._stores:
             yield from self.sdo.transfer(0x1010, 1, _SAVE)
             done = self.now + _STORE_TIME
             while self.now < done:

@@ -92,19 +92,26 @@ class SetpointBuffer:
             keep = bisect.bisect_left(self._points, times[0], key=lambda p: p.time)
             self._points = [*self._points[:keep], *points][-_MOST:]
 
-    def sample(self, now: float) -> Sample | None:
-        """Returns the command at `now`; None while none has begun."""
-        after = bisect.bisect_right(self._points, now, key=lambda p: p.time)
+    def sample(self, time: float) -> Sample | None:
+        """Returns the command at a time, s; None where none has begun by then."""
+        after = bisect.bisect_right(self._points, time, key=lambda p: p.time)
         if after == 0:
             return None
-        if after > 1:
-            del self._points[: after - 1]
-        first = self._points[0]
-        if len(self._points) == 1:
-            return Sample(first.q, first.v, first.trigger, now - first.time)
-        second = self._points[1]
-        q, v = _cubic(first, second, now)
+        first = self._points[after - 1]
+        if after == len(self._points):
+            return Sample(first.q, first.v, first.trigger, time - first.time)
+        q, v = _cubic(first, self._points[after], time)
         return Sample(q, v, first.trigger, 0.0)
+
+    def trigger(self, time: float) -> float:
+        """Returns the trigger at a time, s, of the last setpoint that has begun."""
+        after = bisect.bisect_right(self._points, time, key=lambda p: p.time)
+        return self._points[after - 1].trigger if after else 0.0
+
+    def forget(self, time: float) -> None:
+        """Forgets setpoints that no command from `time`, s, on needs."""
+        after = bisect.bisect_right(self._points, time, key=lambda p: p.time)
+        del self._points[: max(0, after - 1)]
 
 
 def _cubic(a: Setpoint, b: Setpoint, now: float) -> tuple[FloatArray, FloatArray]:

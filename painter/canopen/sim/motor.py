@@ -30,12 +30,14 @@ class Motor:
         """Moves under power towards a demand.
 
         Source: PD with velocity feed-forward,
-        a = w² (demand - x) + 2 d w (demand velocity - v), integrated semi-implicitly.
+        a = w² (demand - x) + 2 d w (demand velocity - v), integrated semi-implicitly
+        with x as it will be at the end of the step.
         """
         if self.is_blocked:
             self.velocity = 0.0
             return
-        wanted = _FREQUENCY**2 * (demand - self.position)
+        ahead = self.position + self.velocity * dt  # The demand is for the step's end.
+        wanted = _FREQUENCY**2 * (demand - ahead)
         wanted += 2.0 * _DAMPING * _FREQUENCY * (demand_velocity - self.velocity)
         limit = self.acceleration_limit
         self.velocity += min(limit, max(-limit, wanted)) * dt
