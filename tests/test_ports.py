@@ -13,6 +13,8 @@ from pydrake.systems.framework import Diagram, LeafSystem
 import painter.systems
 from painter.config import load_scenario
 from painter.diagrams.paint_cycle import MakePaintCycle
+from painter.diagrams.true_wall import true_segmentation
+from painter.planning.remainder import Remainder
 from painter.systems.stage import Stage
 
 MARK = ".. pydrake_system::"
@@ -58,15 +60,17 @@ def documented(system: type[LeafSystem]) -> dict:
 
 
 @pytest.fixture(scope="module")
-def cycle():
-    """Keeps the diagram alive as long as its systems are looked at."""
-    return MakePaintCycle(load_scenario("blank"))
+def cycles():
+    """Keeps the diagrams alive as long as their systems are looked at."""
+    job = load_scenario("blank")
+    known = Remainder(segmentation=true_segmentation(job), strokes=())
+    return MakePaintCycle(job), MakePaintCycle(job, remainder=known)
 
 
 @pytest.fixture(scope="module")
-def instances(cycle):
-    """The systems of a whole paint cycle, by class."""
-    return {type(system): system for system in leaves(cycle.diagram)}
+def instances(cycles):
+    """The systems of whole paint cycles, by class."""
+    return {type(dut): dut for cycle in cycles for dut in leaves(cycle.diagram)}
 
 
 @pytest.mark.parametrize("kind", declared_classes(), ids=lambda kind: kind.__name__)

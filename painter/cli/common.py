@@ -46,6 +46,31 @@ def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
         typer.echo(f"{name:<{width}}  {text}")
 
 
+def mark_corners(option: str, word: str) -> list[list[float]]:
+    """Reads a mark on the tile from the command line.
+
+    Args:
+        option: Name of the option, for messages.
+        word: "X,Y,X,Y...", m.
+
+    Returns:
+        Corners [x, y]: two opposite ones of a rectangle, or all of a polygon.
+
+    Raises:
+        InputError: It is not two or more pairs of numbers.
+    """
+    try:
+        numbers = [float(text) for text in word.split(",")]
+    except ValueError as error:
+        raise InputError(f"{option} {word!r}: {error}.") from error
+    if len(numbers) < 4 or len(numbers) % 2:
+        raise InputError(
+            f"{option} {word!r}: expected two or more pairs X,Y, got {len(numbers)} "
+            "numbers."
+        )
+    return [numbers[i : i + 2] for i in range(0, len(numbers), 2)]
+
+
 @contextmanager
 def progress(description: str) -> Iterator[Callable[[float, str], None]]:
     """Shows a progress bar on stderr while the block runs.

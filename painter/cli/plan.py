@@ -11,6 +11,7 @@ from painter.cli.common import (
     JsonOption,
     OutOption,
     SetOption,
+    mark_corners,
     output_folder,
     print_result,
     progress,
@@ -22,7 +23,7 @@ from painter.planning.preview import preview_film
 from painter.planning.program import strokes_from
 from painter.planning.store import program_summary, save_program
 from painter.planning.tile import nominal_tile_pose
-from painter.planning.touch_up import marked_cells, touch_up_strokes
+from painter.planning.zones import marked_cells
 from painter.run.film_on_tile import film_on_tile
 from painter.run.film_preview import preview_picture
 from painter.run.folder import RunFolder
@@ -105,14 +106,7 @@ def plan(
         if film is None:
             strokes = planner.strokes(wall)
         else:
-            strokes = touch_up_strokes(
-                film,
-                np.asarray(wall.wall_mask),
-                wall.cell,
-                nominal=nominal,
-                tip=planner.tip,
-                raster=planner.raster,
-            )
+            strokes = planner.touch_up_strokes(wall, film)
         program = planner.program(strokes, wall, home)
         if from_stroke != 1.0:
             rest = strokes_from(program.strokes, from_stroke)
@@ -147,9 +141,5 @@ def _film_to_mend(
         return film_on_tile(RunFolder(touch_up), wall)
     if mark is None:
         return None
-    try:
-        corners = np.array([float(word) for word in mark.split(",")]).reshape(-1, 2)
-        marked = marked_cells(corners, shape, cell)
-    except ValueError as error:
-        raise InputError(f"--mark {mark!r}: {error}") from error
+    marked = marked_cells(mark_corners("--mark", mark), shape, cell)
     return np.where(marked, 0.0, nominal)

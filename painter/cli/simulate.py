@@ -2,7 +2,7 @@
 
 import importlib.metadata
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +12,7 @@ from PIL import Image
 from pydrake.geometry import Meshcat
 
 from painter.cli.common import JsonOption, SetOption, print_result, progress
+from painter.cli.earlier_run import EarlierRun
 from painter.config import Scenario, dump_scenario, load_scenario
 from painter.diagrams.simulation import (
     CycleLog,
@@ -19,10 +20,10 @@ from painter.diagrams.simulation import (
     Watch,
     clearance_violations,
 )
-from painter.errors import FaultError
-from painter.planning.preview import preview_film
+from painter.errors import FaultError, InputError
 from painter.planning.stroke_lines import nominal_pitch
 from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
+from painter.run.film_preview import run_preview
 from painter.run.folder import LOOK, SCENE, RunFolder
 from painter.run.replay import add_paint, set_view
 from painter.run.report import finish_run
@@ -30,6 +31,7 @@ from painter.run.values import Executed, Film, Truth
 from painter.scene.load import load_scene
 from painter.scene.sdf import wall_pose
 from painter.scene.surface import height_field, is_paintable, surface_at
+from painter.systems.paint_film import FilmState
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 
 # How much nearer than planned the robot may come: tracking and the map's own error.
@@ -40,8 +42,13 @@ VERSIONS = ("painter", "drake", "numpy", "scipy", "open3d")
 
 def simulate(
     scenario: Annotated[
-        str, typer.Argument(help="Name of a scenario, or the path of its YAML file.")
-    ] = "cubes",
+        str | None,
+        typer.Argument(
+            help="Name of a scenario, or the path of its YAML file; default cubes, or "
+            "that of the run gone on with.",
+            show_default=False,
+        ),
+    ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Run folder to write.")
     ] = Path("runs/latest"),
@@ -55,9 +62,39 @@ def simulate(
     replay: Annotated[
         bool, typer.Option("--replay/--no-replay", help="Record scene.html.")
     ] = True,
+    stop_at_stroke: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            help="Abort as the operator does, where stroke N is reached; 12.4 = within "
+            "the twelfth.",
+        ),
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN", help="Go on with a run that was stopped, on its film."
+        ),
+    ] = None,
+    touch_up: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Mend a run's film where it is thin."),
+    ] = None,
+    clear: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,X,Y...",
+            help="With --touch-up: take the film off this mark first; two opposite "
+            "corners of a rectangle or the corners of a polygon, m from the tile's "
+            "lower left corner.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate the whole paint cycle: look, scan, segment, plan, paint, report.
+
+    With --resume or --touch-up the wall is that of an earlier run, as it was seen and
+    painted there, and is not looked at again.
 
     Args:
         scenario: Name or path.
@@ -66,13 +103,19 @@ def simulate(
         seed: Random seed over the scenario's.
         meshcat: Live view.
         replay: Record the Meshcat replay.
+        stop_at_stroke: Where the operator aborts.
+        resume: Run to be gone on with.
+        touch_up: Run to be mended.
+        clear: Mark from which film is taken off before that.
         as_json: Print report.json's content alone.
 
     Raises:
+        InputError: The options do not go together or name nothing to be read.
         FaultError: The cycle did not come to DONE; the run folder says why.
     """
     words = [*(overrides or []), *([f"random_seed={seed}"] if seed is not None else [])]
-    job = load_scenario(scenario, words)
+    earlier = _earlier(scenario, out, words, resume, touch_up, clear)
+    job = load_scenario(scenario or "cubes", words) if earlier is None else earlier.job
     load_scene(job.scene, job.random_seed)  # Fails before anything is written.
     folder = RunFolder.create(out, dump_scenario(job))
     start = time.perf_counter()
@@ -85,8 +128,14 @@ def simulate(
     versions = {name: importlib.metadata.version(name) for name in VERSIONS}
     folder.log(0.0, "started", versions=versions)
     with progress(f"Simulating {job.name}") as show:
-        log = SimulateCycle(job, meshcat=viewer, watch=_watch(folder, show))
-    write_log(folder, job, log)
+        log = SimulateCycle(
+            job,
+            remainder=None if earlier is None else earlier.remainder,
+            film=None if earlier is None else earlier.film,
+            meshcat=viewer,
+            watch=_watch(folder, show, stop_at_stroke),
+        )
+    write_log(folder, job, log, before=None if earlier is None else earlier.film)
     if replay and viewer is not None:
         sprayed = np.flatnonzero(log.trigger)
         if log.program is not None and sprayed.size:
@@ -110,13 +159,45 @@ def simulate(
         raise FaultError(f"{log.status.phase.value}: {log.status.cause}")
 
 
-def write_log(folder: RunFolder, scenario: Scenario, log: CycleLog) -> None:
+def _earlier(
+    scenario: str | None,
+    out: Path,
+    words: Sequence[str],
+    resume: Path | None,
+    touch_up: Path | None,
+    clear: str | None,
+) -> EarlierRun | None:
+    """Returns the run that is gone on with, if any."""
+    run = resume or touch_up
+    if resume is not None and touch_up is not None:
+        raise InputError("--resume and --touch-up: only one of them can be given.")
+    if clear is not None and touch_up is None:
+        raise InputError("--clear: goes with --touch-up alone.")
+    if run is None:
+        return None
+    if scenario is not None:
+        raise InputError(f"{scenario}: the scenario is that of {run}; give none.")
+    if out.resolve() == run.resolve():
+        raise InputError(f"--out {out}: is the run to be gone on with; give another.")
+    if resume is not None:
+        return EarlierRun.to_resume(resume, words)
+    return EarlierRun.to_touch_up(run, words, clear)
+
+
+def write_log(
+    folder: RunFolder,
+    scenario: Scenario,
+    log: CycleLog,
+    *,
+    before: FilmState | None = None,
+) -> None:
     """Writes what a simulated cycle left, with the truth of its scene.
 
     Args:
         folder: The run's folder; its event log holds the cycle's events already.
         scenario: The job.
         log: What it left.
+        before: Film that was there before it; None = none.
     """
     for distances, planned in (
         (log.clearance, scenario.motion.clearance),
@@ -160,14 +241,6 @@ def write_log(folder: RunFolder, scenario: Scenario, log: CycleLog) -> None:
             ),
         )
     )
-    if log.program is not None:
-        preview = preview_film(
-            log.program.strokes,
-            log.segmentation,
-            tip=scenario.gun.tip,
-            nominal=log.program.nominal_thickness,
-        )
-        folder.save_program(log.program, preview)
     surface = height_field(
         scene,
         cell=log.film.cell,
@@ -188,17 +261,26 @@ def write_log(folder: RunFolder, scenario: Scenario, log: CycleLog) -> None:
             sprayed=log.film.sprayed,
             landed=log.film.landed,
             missed=log.film.missed,
+            before=None if before is None else before.thickness,
         )
     )
+    if log.program is not None:
+        preview = run_preview(folder, log.program, folder.scenario())
+        folder.save_program(log.program, preview)
 
 
-def _watch(folder: RunFolder, show: Callable[[float, str], None]) -> Watch:
-    """Returns a watcher that logs each event once and moves the progress bar."""
+def _watch(
+    folder: RunFolder, show: Callable[[float, str], None], stop_at: float | None
+) -> Watch:
+    """Returns a watcher that logs each event once and moves the progress bar.
+
+    It aborts where `stop_at`, the number of a stroke, is reached.
+    """
     logged = 0
     phases = list(Phase)
     last = phases.index(Phase.DONE)
 
-    def watch(now: float, status: CycleStatus, follower: FollowerStatus) -> None:
+    def watch(now: float, status: CycleStatus, follower: FollowerStatus) -> str | None:
         nonlocal logged
         for when, name, data in status.events[logged:]:
             folder.log(when, name, **data)
@@ -212,6 +294,10 @@ def _watch(folder: RunFolder, show: Callable[[float, str], None]) -> Watch:
         elif index > phases.index(Phase.PAINT):
             share = 1.0
         show(share, text)
+        painting = status.phase == Phase.PAINT
+        if stop_at is not None and painting and status.next_stroke >= stop_at:
+            return "abort"
+        return None
 
     return watch
 

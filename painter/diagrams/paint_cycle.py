@@ -1,23 +1,34 @@
 """The brain, and the whole paint cycle: a station with the brain."""
 
 import dataclasses
+from typing import Any
 
+import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.config import Scenario
 from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.diagrams.station import MakeStation
+from painter.planning.remainder import Remainder
 from painter.planning.tile import nominal_tile_pose
 from painter.systems.camera_pose import CameraPose
+from painter.systems.known_result import KnownResult
 from painter.systems.map_accumulator import MapAccumulator
 from painter.systems.motion_planner import MotionPlanner
-from painter.systems.paint_cycle import STAGES, PaintCycle
+from painter.systems.paint_cycle import (
+    KNOWN_WALL_SEQUENCE,
+    SEQUENCE,
+    STAGES,
+    PaintCycle,
+)
+from painter.systems.paint_film import FilmState
 from painter.systems.path_follower import PathFollower
 from painter.systems.spray_path_planner import SprayPathPlanner
 from painter.systems.wall_finder import WallFinder
 from painter.systems.wall_segmenter import WallSegmenter
 from perception.depth import CameraIntrinsics
+from perception.values import Wall
 
 # Inputs and outputs of the brain that meet the station's ports of the same name.
 STATION_TO_BRAIN = (
@@ -29,11 +40,13 @@ STATION_TO_BRAIN = (
 BRAIN_TO_STATION = ("arm.desired_state", "gun.trigger")
 
 
-def MakeBrain(scenario: Scenario) -> Diagram:
+def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diagram:
     """Makes the brain: all that looks, decides and plans, the same on every body.
 
     Args:
         scenario: The job.
+        remainder: What is left to do on a wall that was seen before; None = look at
+            the wall and paint all of it.
 
     Returns:
         A diagram with the inputs STATION_TO_BRAIN and `operator` (OperatorCommand, may
@@ -57,27 +70,6 @@ def MakeBrain(scenario: Scenario) -> Diagram:
             period=1.0 / scenario.wall_camera.rate,
         ),
     )
-    finder = add(
-        "wall_finder",
-        WallFinder(
-            X_WT_expected=X_WT_expected,
-            width=scenario.tile.width,
-            height=scenario.tile.height,
-            config=scenario.segmentation,
-            seed=scenario.random_seed,
-            period=period,
-        ),
-    )
-    segmenter = add(
-        "wall_segmenter",
-        WallSegmenter(
-            width=scenario.tile.width,
-            height=scenario.tile.height,
-            config=scenario.segmentation,
-            seed=scenario.random_seed,
-            period=period,
-        ),
-    )
     mover = add(
         "motion_planner",
         MotionPlanner(
@@ -93,7 +85,12 @@ def MakeBrain(scenario: Scenario) -> Diagram:
     )
     spray_planner = add(
         "spray_path_planner",
-        SprayPathPlanner(planner=planner, tile=scenario.tile, period=period),
+        SprayPathPlanner(
+            planner=planner,
+            tile=scenario.tile,
+            period=period,
+            strokes=None if remainder is None else remainder.strokes,
+        ),
     )
     follower = add("path_follower", PathFollower(period=period))
     cycle = add(
@@ -103,21 +100,22 @@ def MakeBrain(scenario: Scenario) -> Diagram:
             period=period,
             look_time=scenario.scan.look_time,
             time_limit=scenario.cycle.time_limit,
+            sequence=SEQUENCE if remainder is None else KNOWN_WALL_SEQUENCE,
         ),
     )
-    stages = dict(zip(STAGES, (mover, finder, segmenter, spray_planner), strict=True))
-    # Pictures become the map.
+    # Pictures become the map, and the map the wall.
     connect = builder.Connect
+    if remainder is None:
+        finder, segmenter = _AddPerception(builder, scenario, accumulator)
+    else:
+        finder, segmenter = _AddKnownWall(builder, scenario, remainder)
+    stages = dict(zip(STAGES, (mover, finder, segmenter, spray_planner), strict=True))
     connect(camera_pose.GetOutputPort("X_WC"), accumulator.GetInputPort("X_WC"))
     connect(cycle.GetOutputPort("camera_enabled"), accumulator.GetInputPort("enabled"))
     wall_port = finder.GetOutputPort("result")
-    for system in (accumulator, segmenter, mover):
+    for system in (accumulator, mover):
         connect(wall_port, system.GetInputPort("wall"))
-    for system in (finder, segmenter):
-        connect(
-            accumulator.GetOutputPort("surface_map"), system.GetInputPort("surface_map")
-        )
-    # The map becomes a program.
+    # The wall becomes a program.
     connect(
         segmenter.GetOutputPort("result"), spray_planner.GetInputPort("segmentation")
     )
@@ -162,6 +160,48 @@ def MakeBrain(scenario: Scenario) -> Diagram:
     return diagram
 
 
+def _AddPerception(
+    builder: DiagramBuilder, scenario: Scenario, accumulator: MapAccumulator
+) -> tuple[WallFinder, WallSegmenter]:
+    """Adds the stages that find and segment the wall in the map."""
+    settings: dict[str, Any] = {
+        "width": scenario.tile.width,
+        "height": scenario.tile.height,
+        "config": scenario.segmentation,
+        "seed": scenario.random_seed,
+        "period": scenario.cycle.period,
+    }
+    finder = builder.AddNamedSystem(
+        "wall_finder",
+        WallFinder(X_WT_expected=nominal_tile_pose(scenario.tile), **settings),
+    )
+    segmenter = builder.AddNamedSystem("wall_segmenter", WallSegmenter(**settings))
+    map_port = accumulator.GetOutputPort("surface_map")
+    for system in (finder, segmenter):
+        builder.Connect(map_port, system.GetInputPort("surface_map"))
+    builder.Connect(finder.GetOutputPort("result"), segmenter.GetInputPort("wall"))
+    return finder, segmenter
+
+
+def _AddKnownWall(
+    builder: DiagramBuilder, scenario: Scenario, remainder: Remainder
+) -> tuple[KnownResult, KnownResult]:
+    """Adds stages that answer with the wall as it was found and segmented before."""
+    wall = Wall(
+        X_WT=remainder.segmentation.X_WT, rms=np.nan, inlier_count=0, inlier_share=0.0
+    )
+    finder, segmenter = (
+        builder.AddNamedSystem(
+            stage, KnownResult(stage=stage, value=value, period=scenario.cycle.period)
+        )
+        for stage, value in (
+            ("wall_finder", wall),
+            ("wall_segmenter", remainder.segmentation),
+        )
+    )
+    return finder, segmenter
+
+
 @dataclasses.dataclass(frozen=True)
 class PaintCycleDiagram:
     """The whole cycle.
@@ -179,17 +219,23 @@ class PaintCycleDiagram:
 
 
 def MakePaintCycle(
-    scenario: Scenario, *, meshcat: Meshcat | None = None
+    scenario: Scenario,
+    *,
+    remainder: Remainder | None = None,
+    film: FilmState | None = None,
+    meshcat: Meshcat | None = None,
 ) -> PaintCycleDiagram:
     """Makes the whole paint cycle of a scenario.
 
     Args:
         scenario: The job.
+        remainder: See `MakeBrain`.
+        film: What is on the wall already; simulation only. None = nothing.
         meshcat: Where to show it, or None.
     """
     builder = DiagramBuilder()
-    station = builder.AddSystem(MakeStation(scenario, meshcat=meshcat))
-    brain = builder.AddSystem(MakeBrain(scenario))
+    station = builder.AddSystem(MakeStation(scenario, film=film, meshcat=meshcat))
+    brain = builder.AddSystem(MakeBrain(scenario, remainder=remainder))
     for name in STATION_TO_BRAIN:
         builder.Connect(station.GetOutputPort(name), brain.GetInputPort(name))
     for name in BRAIN_TO_STATION:

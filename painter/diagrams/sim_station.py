@@ -47,7 +47,7 @@ from painter.scene.surface import height_field
 from painter.systems.clearance_monitor import ClearanceMonitor
 from painter.systems.gun_pose import GunPose
 from painter.systems.joint_encoder import JointEncoder
-from painter.systems.paint_film import PaintFilm
+from painter.systems.paint_film import FilmState, PaintFilm
 from painter.systems.simulated_drives import SimulatedDrives
 from painter.systems.stereo_camera import StereoCamera, render_camera_info
 from perception.depth import CameraIntrinsics
@@ -62,7 +62,12 @@ FILM_MARGIN = 0.35
 FEED_FORWARD_PERIOD = 0.004
 
 
-def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Diagram:
+def MakeSimStation(
+    scenario: Scenario,
+    *,
+    film: FilmState | None = None,
+    meshcat: Meshcat | None = None,
+) -> Diagram:
     """Makes the simulated station of a scenario.
 
     The arm stands at its nominal pose in W; the errors of the base placement move the
@@ -70,6 +75,7 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
 
     Args:
         scenario: Robot, scene, camera and gun.
+        film: What is on the wall already; None = nothing.
         meshcat: Where to show robot and scene, or None.
 
     Returns:
@@ -89,7 +95,7 @@ def MakeSimStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Dia
     plant.SetDefaultPositions(arm, np.deg2rad(scenario.motion.home_deg))
     _AddDrives(builder, plant, scenario)
     camera = _AddWallCamera(builder, plant, scene_graph, scenario)
-    _AddGun(builder, plant, scenario, camera, scene, X_WS)
+    _AddGun(builder, plant, scenario, camera, scene, X_WS, film)
     _AddClearance(builder, plant, scene_graph)
     builder.ExportOutput(plant.get_state_output_port(arm), "cheat.state")
     if meshcat is not None:
@@ -262,6 +268,7 @@ def _AddGun(
     camera: StereoCamera,
     scene: Scene,
     X_WS: RigidTransform,
+    before: FilmState | None,
 ) -> None:
     """Adds the paint film on the scene's true surface."""
     arm = plant.GetModelInstanceByName("arm")
@@ -280,6 +287,7 @@ def _AddGun(
             origin=surface.origin,
             X_WS=X_WS,
             tip=scenario.gun.tip,
+            before=before,
         ),
     )
     gun = builder.AddNamedSystem(

@@ -15,9 +15,16 @@ from painter.config import Scenario
 from painter.diagrams.arm_model import GetArmKinematics, MakeArmPlant
 from painter.diagrams.paint_cycle import MakePaintCycle, PaintCycleDiagram
 from painter.planning.kinematics import ArmKinematics
+from painter.planning.remainder import Remainder
 from painter.planning.spray_path import PaintProgram
 from painter.systems.paint_film import FilmState
-from painter.systems.values import CycleStatus, FollowerStatus, Phase, StageResult
+from painter.systems.values import (
+    CycleStatus,
+    FollowerStatus,
+    OperatorCommand,
+    Phase,
+    StageResult,
+)
 from perception.values import FloatArray, FrozenValue, SurfaceMap, WallSegmentation
 
 NQ = 5
@@ -26,7 +33,8 @@ CLEARANCE_PERIOD = 0.05
 # Robot time between looks at the cycle from outside, s.
 WATCH_PERIOD = 0.1
 
-Watch = Callable[[float, CycleStatus, FollowerStatus], None]
+# Sees the robot's time, s, and both statuses; may return a word of the operator's.
+Watch = Callable[[float, CycleStatus, FollowerStatus], str | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,20 +79,28 @@ class CycleLog(FrozenValue):
 
 
 def SimulateCycle(
-    scenario: Scenario, *, meshcat: Meshcat | None = None, watch: Watch | None = None
+    scenario: Scenario,
+    *,
+    remainder: Remainder | None = None,
+    film: FilmState | None = None,
+    meshcat: Meshcat | None = None,
+    watch: Watch | None = None,
 ) -> CycleLog:
     """Simulates a paint cycle until it is finished.
 
     Args:
         scenario: The job.
+        remainder: What is left to do on a wall that was seen before; None = look at
+            the wall and paint all of it.
+        film: What is on the wall already; None = nothing.
         meshcat: Where to show it, or None.
         watch: Called every WATCH_PERIOD of robot time with the time, s, and the
-            cycle's and the follower's status.
+            cycle's and the follower's status; a word that it returns is the operator's.
 
     Returns:
         What the cycle left, whether it came to DONE or not.
     """
-    cycle = MakePaintCycle(scenario, meshcat=meshcat)
+    cycle = MakePaintCycle(scenario, remainder=remainder, film=film, meshcat=meshcat)
     builder = DiagramBuilder()
     builder.AddNamedSystem("paint_cycle", cycle.diagram)
     sinks = {
@@ -98,17 +114,23 @@ def SimulateCycle(
             ("floor_clearance", "cheat.floor_clearance", CLEARANCE_PERIOD),
         )
     }
-    simulator = Simulator(builder.Build())
+    builder.ExportInput(cycle.diagram.GetInputPort("operator"), "operator")
+    root = builder.Build()
+    simulator = Simulator(root)
     context = simulator.get_mutable_context()
+    said = OperatorCommand()
+    root.GetInputPort("operator").FixValue(context, said)
     simulator.Initialize()
     look_image = None
     while True:
         simulator.AdvanceTo(context.get_time() + WATCH_PERIOD)
         status: CycleStatus = _Evaluate(cycle, context, "cycle_status")
         if watch is not None:
-            watch(
-                context.get_time(), status, _Evaluate(cycle, context, "follower_status")
-            )
+            follower = _Evaluate(cycle, context, "follower_status")
+            word = watch(context.get_time(), status, follower)
+            if word is not None:
+                said = OperatorCommand(number=said.number + 1, word=word)
+                root.GetInputPort("operator").FixValue(context, said)
         if look_image is None and status.phase == Phase.SCAN:
             look_image = _ColorImage(cycle, context)
         if status.finished:

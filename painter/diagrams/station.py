@@ -5,6 +5,7 @@ from pydrake.systems.framework import Diagram
 
 from painter.config import Scenario
 from painter.diagrams.sim_station import MakeSimStation
+from painter.systems.paint_film import FilmState
 
 STATION_INPUTS = frozenset({"arm.desired_state", "gun.trigger"})
 STATION_OUTPUTS = frozenset(
@@ -19,17 +20,23 @@ STATION_OUTPUTS = frozenset(
 CHEAT_PREFIX = "cheat."
 
 
-def MakeStation(scenario: Scenario, *, meshcat: Meshcat | None = None) -> Diagram:
+def MakeStation(
+    scenario: Scenario,
+    *,
+    film: FilmState | None = None,
+    meshcat: Meshcat | None = None,
+) -> Diagram:
     """Makes the simulated station.
 
     Args:
         scenario: What stands in front of which robot.
+        film: What is on the wall already; None = nothing.
         meshcat: Where to show it, or None.
 
     Returns:
         A diagram with exactly the ports of the contract, plus `cheat.*`.
     """
-    station = MakeSimStation(scenario, meshcat=meshcat)
+    station = MakeSimStation(scenario, film=film, meshcat=meshcat)
     CheckPorts(station)
     return station
 

@@ -22,6 +22,11 @@ MARGIN = 0.14
 _TABLE = np.linspace(-1.0, 1.0, 2001)
 
 
+def margin_cells(cell: float) -> int:
+    """Returns how many cells of edge `cell`, m, the margin is wide."""
+    return int(np.ceil(MARGIN / cell))
+
+
 @dataclass(frozen=True, eq=False)
 class Site(FrozenValue):
     """A tile and a margin around it, as far as spraying is concerned.
@@ -52,7 +57,7 @@ class Site(FrozenValue):
             height: (ny, nx) m along T z, NaN = nothing seen there; what lies
                 farther back than the margin is taken there. None = a plane.
         """
-        border = int(np.ceil(MARGIN / cell))
+        border = margin_cells(cell)
         flat = np.zeros(mask.shape) if height is None else np.where(mask, 0.0, height)
         return cls(
             wanted=np.pad(mask, border),

@@ -62,6 +62,7 @@ def preview_film(
     *,
     tip: TipConfig,
     nominal: float,
+    before: FloatArray | None = None,
 ) -> FilmPreview:
     """Predicts the film of strokes on a wall as it was seen.
 
@@ -70,6 +71,8 @@ def preview_film(
         segmentation: Of the tile; things that stand out shade what is behind them.
         tip: The spray tip.
         nominal: Wet film aimed at, m.
+        before: Film that is there already, m, on the tile and `margin_cells` around
+            it; None = nothing.
 
     Returns:
         The film and its figures.
@@ -80,6 +83,8 @@ def preview_film(
         np.asarray(segmentation.depth, dtype=np.float64),
     )
     film = FilmModel(site, tip=tip, speed=_SPEED, nominal=nominal).film(strokes)
+    if before is not None:
+        film = film + before / nominal
     wall, clean, landed = film[site.wanted], film[site.clean], film.sum()
     mean = wall.mean() if wall.size else 0.0
     return FilmPreview(

@@ -18,7 +18,9 @@ from painter.planning.obstacles import ClearSpace, segmentation_boxes
 from painter.planning.raster import plan_strokes, raster_film
 from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
 from painter.planning.stroke_order import order_strokes
+from painter.planning.touch_up import touch_up_strokes
 from painter.planning.verify import verify_motion, verify_strokes
+from painter.planning.zones import in_zones
 from perception.values import FloatArray, FrozenValue, WallSegmentation
 
 _TRIMS = (0.0, 0.02, 0.05, 0.10, 0.20)  # m, off a stroke's end for room to turn.
@@ -59,6 +61,20 @@ class ProgramPlanner(FrozenValue):
             tip=self.tip,
             raster=self.raster,
             height=np.asarray(segmentation.depth, dtype=np.float64),
+        )
+
+    def touch_up_strokes(
+        self, segmentation: WallSegmentation, film: FloatArray
+    ) -> tuple[Stroke, ...]:
+        """Returns the strokes that mend a film (ny, nx), m, where it is thin."""
+        raster, cell = self.raster, segmentation.cell
+        return touch_up_strokes(
+            film,
+            in_zones(np.asarray(segmentation.wall_mask), cell, raster.zones),
+            cell,
+            nominal=self.nominal_film(segmentation),
+            tip=self.tip,
+            raster=raster,
         )
 
     def nominal_film(self, segmentation: WallSegmentation) -> float:

@@ -5,7 +5,6 @@ lacking: the flow of each stroke is fitted to the film that is there already.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import ndimage
 from scipy.optimize import lsq_linear
 
@@ -67,36 +66,6 @@ def touch_up_strokes(
         spot = thin & (groups == number)
         strokes += _mend(spot, lack, cell, nominal, tip=tip, raster=raster)
     return tuple(strokes)
-
-
-def marked_cells(
-    corners_T: ArrayLike, shape: tuple[int, int], cell: float
-) -> BoolArray:
-    """Returns the cells inside an operator's mark.
-
-    Args:
-        corners_T: (n, 2) m, in T: two opposite corners of a rectangle, or the three or
-            more corners of a polygon.
-        shape: (ny, nx) of the tile's grid.
-        cell: Edge of a cell, m.
-
-    Raises:
-        ValueError: There are fewer than two corners.
-    """
-    corners = np.asarray(corners_T, dtype=float).reshape(-1, 2)
-    if len(corners) < 2:
-        raise ValueError(f"a mark has 2 or more corners, got {len(corners)}.")
-    if len(corners) == 2:
-        (x0, y0), (x1, y1) = corners
-        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-    x, y = np.meshgrid(*cell_centres(shape, cell))
-    inside = np.zeros(shape, dtype=bool)
-    # Even-odd rule: edges to the right of a point.
-    for (xa, ya), (xb, yb) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        crosses = (ya > y) != (yb > y)
-        if ya != yb:
-            inside ^= crosses & (x < xa + (y - ya) * (xb - xa) / (yb - ya))
-    return inside
 
 
 def _mend(

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.path import Path
+from numpy.typing import ArrayLike
 
 from painter.planning.config import ZoneConfig
-from painter.planning.tile import cell_centres
-from perception.values import BoolArray
+from painter.planning.tile import cell_centres, grid_points
+from perception.values import BoolArray, FloatArray
 
 
 def in_zones(mask: BoolArray, cell: float, zones: Sequence[ZoneConfig]) -> BoolArray:
@@ -22,17 +23,49 @@ def in_zones(mask: BoolArray, cell: float, zones: Sequence[ZoneConfig]) -> BoolA
     Returns:
         (ny, nx) bool.
     """
-    included = [_inside(mask, cell, zone) for zone in zones if zone.kind == "include"]
-    excluded = [_inside(mask, cell, zone) for zone in zones if zone.kind == "exclude"]
-    marked = mask & np.any(included, axis=0) if included else mask
-    return np.asarray(marked & ~np.any(excluded, axis=0) if excluded else marked)
+    shape = (mask.shape[0], mask.shape[1])
+    marked = np.array(mask)
+    included = [z.corners for z in zones if z.kind == "include"]
+    if included:
+        marked &= np.any([marked_cells(c, shape, cell) for c in included], axis=0)
+    for zone in zones:
+        if zone.kind == "exclude":
+            marked &= ~marked_cells(zone.corners, shape, cell)
+    return marked
 
 
-def _inside(mask: BoolArray, cell: float, zone: ZoneConfig) -> BoolArray:
-    x, y = cell_centres((mask.shape[0], mask.shape[1]), cell)
-    points = np.stack([part.ravel() for part in np.meshgrid(x, y)], axis=1)
-    corners = np.asarray(zone.corners, dtype=np.float64)
+def marked_cells(
+    corners_T: ArrayLike, shape: tuple[int, int], cell: float
+) -> BoolArray:
+    """Returns the cells of a tile whose centres lie inside a mark.
+
+    Args:
+        corners_T: See `inside`.
+        shape: (ny, nx) of the tile's grid.
+        cell: Edge of a cell, m.
+    """
+    p_TQs = grid_points(*cell_centres(shape, cell))
+    return inside(corners_T, p_TQs[:2].T).reshape(shape)
+
+
+def inside(corners_T: ArrayLike, points_T: FloatArray) -> BoolArray:
+    """Tells which points lie inside a mark.
+
+    Args:
+        corners_T: (n, 2) m, in T: two opposite corners of a rectangle, or the three or
+            more corners of a polygon.
+        points_T: (k, 2) m, in T.
+
+    Returns:
+        (k,) bool.
+
+    Raises:
+        ValueError: There are fewer than two corners.
+    """
+    corners = np.asarray(corners_T, dtype=np.float64).reshape(-1, 2)
+    if len(corners) < 2:
+        raise ValueError(f"a mark has 2 or more corners, got {len(corners)}.")
     if len(corners) == 2:
-        inside = (points >= corners.min(axis=0)) & (points <= corners.max(axis=0))
-        return np.asarray(inside.all(axis=1).reshape(mask.shape))
-    return np.asarray(Path(corners).contains_points(points).reshape(mask.shape))
+        within = (points_T >= corners.min(axis=0)) & (points_T <= corners.max(axis=0))
+        return np.asarray(within.all(axis=1))
+    return np.asarray(Path(corners).contains_points(points_T))

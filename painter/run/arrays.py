@@ -43,21 +43,27 @@ def load_executed(path: Path) -> Executed:
 
 def save_film(path: Path, film: Film) -> None:
     """Writes film.npz."""
-    _save(path, vars(film) | {"thickness": film.thickness.astype(np.float32)})
+    grids = {"thickness": film.thickness, "before": film.before}
+    _save(
+        path,
+        {name: value for name, value in vars(film).items() if name not in grids}
+        | {k: v.astype(np.float32) for k, v in grids.items() if v is not None},
+    )
 
 
 def load_film(path: Path) -> Film:
     """Reads film.npz; raises InputError if it is not one."""
     grids = ("thickness", "kind", "truth_paintable", "truth_keepout")
     numbers = ("cell", "x0", "y0", "sprayed", "landed", "missed")
-    data = _load(path, grids + numbers)
+    data = _load(path, grids + numbers, optional=("before",))
     shape = data["thickness"].shape
-    for name in grids:
+    for name in data.keys() - set(numbers):
         if data[name].shape != shape or len(shape) != 2:
             raise InputError(
                 f"{path}: {name} has shape {data[name].shape}, not {shape}."
             )
-    data["thickness"] = data["thickness"].astype(float)
+    for name in data.keys() & {"thickness", "before"}:
+        data[name] = data[name].astype(float)
     return Film(**data | {name: float(data[name]) for name in numbers})
 
 
@@ -121,10 +127,11 @@ def _save(path: Path, arrays: Mapping[str, Any]) -> None:
     write_whole(path, lambda draft: np.savez_compressed(draft, **arrays))
 
 
-def _load(path: Path, names: Sequence[str]) -> dict:
+def _load(path: Path, names: Sequence[str], optional: Sequence[str] = ()) -> dict:
     try:
         with np.load(path) as file:
-            return {name: file[name] for name in names}
+            present = [name for name in optional if name in file]
+            return {name: file[name] for name in (*names, *present)}
     except KeyError as error:
         raise InputError(f"{path}: {error.args[0]}") from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:

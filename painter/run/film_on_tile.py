@@ -1,10 +1,12 @@
-"""A run's film on the grid of its segmentation, where touch-up is planned."""
+"""A run's film on the grid of its segmentation, where strokes are planned."""
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
 from painter.errors import InputError
+from painter.planning.tile import cell_centres, grid_points
 from painter.run.folder import FILM, TRUTH, RunFolder
+from painter.run.values import Film, Truth
 from perception.values import FloatArray, WallSegmentation
 
 
@@ -21,19 +23,41 @@ def film_on_tile(run: RunFolder, wall: WallSegmentation) -> FloatArray:
     Raises:
         InputError: The run has no film, or nothing that tells where its grid lies.
     """
+    film, truth = film_and_truth(run)
+    return film_at(film.thickness, film, truth, wall)
+
+
+def film_and_truth(run: RunFolder) -> tuple[Film, Truth]:
+    """Reads a run's film and where it lies; raises InputError if one is missing."""
     film, truth = run.film(), run.truth()
-    for name, part in ((FILM, film), (TRUTH, truth)):
-        if part is None:
-            raise InputError(f"{run.path / name}: no such file.")
-    assert film is not None
-    assert truth is not None
-    ny, nx = wall.wall_mask.shape
-    x, y = np.meshgrid(
-        (np.arange(nx) + 0.5) * wall.cell, (np.arange(ny) + 0.5) * wall.cell
-    )
-    p_TQs = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    p_SQs = truth.X_WS.inverse() @ wall.X_WT @ p_TQs
+    if film is None:
+        raise InputError(f"{run.path / FILM}: no such file.")
+    if truth is None:
+        raise InputError(f"{run.path / TRUTH}: no such file.")
+    return film, truth
+
+
+def film_at(
+    thickness: FloatArray,
+    film: Film,
+    truth: Truth,
+    wall: WallSegmentation,
+    *,
+    border: int = 0,
+) -> FloatArray:
+    """Returns a film, m, on a tile's grid and `border` cells around it.
+
+    Args:
+        thickness: (ny, nx) m, on the film's grid.
+        film: Gives that grid.
+        truth: Tells where it lies.
+        wall: Segmentation whose tile frame and grid are wanted.
+        border: Cells on each side.
+    """
+    ny, nx = (size + 2 * border for size in wall.wall_mask.shape)
+    x, y = cell_centres((ny, nx), wall.cell, margin=border * wall.cell)
+    p_SQs = truth.X_WS.inverse() @ wall.X_WT @ grid_points(x, y)
     column = (p_SQs[0] - film.x0) / film.cell - 0.5
     row = (p_SQs[1] - film.y0) / film.cell - 0.5
-    thickness = map_coordinates(film.thickness, [row, column], order=1, mode="nearest")
-    return np.asarray(thickness, dtype=np.float64).reshape(ny, nx)
+    found = map_coordinates(thickness, [row, column], order=1, mode="nearest")
+    return np.asarray(found, dtype=np.float64).reshape(ny, nx)

@@ -6,10 +6,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from painter.planning.config import TipConfig
+from painter.planning.film_model import margin_cells
 from painter.planning.preview import FilmPreview, preview_film
 from painter.planning.spray_path import PaintProgram
 from painter.planning.tile import grid_points
 from painter.run import style
+from painter.run.film_on_tile import film_at
 from painter.run.folder import RunFolder
 from painter.run.values import Film
 from perception.values import WallSegmentation
@@ -18,7 +20,9 @@ from perception.values import WallSegmentation
 def run_preview(
     folder: RunFolder, program: PaintProgram, scenario: dict[str, Any]
 ) -> FilmPreview | None:
-    """Predicts the film of a run's program on the wall as the robot saw it.
+    """Predicts the film after a run's program, on the wall as the robot saw it.
+
+    What an earlier run left counts, where this one went on from it.
 
     Args:
         folder: The run.
@@ -31,11 +35,16 @@ def run_preview(
     segmentation = folder.segmentation()
     if segmentation is None:
         return None
+    film, truth, before = folder.film(), folder.truth(), None
+    if film is not None and film.before is not None and truth is not None:
+        border = margin_cells(segmentation.cell)
+        before = film_at(film.before, film, truth, segmentation, border=border)
     return preview_film(
         program.strokes,
         segmentation,
         tip=TipConfig(**scenario["gun"]["tip"]),
         nominal=program.nominal_thickness,
+        before=before,
     )
 
 

@@ -49,6 +49,7 @@ class Film(FrozenValue):
         landed: Volume that landed on the grid, m³.
         missed: Volume that was to land (transfer efficiency taken off) but went past
             the grid, m³.
+        before: (ny, nx) m, what of `thickness` an earlier run left; None = nothing.
     """
 
     thickness: FloatArray
@@ -61,6 +62,7 @@ class Film(FrozenValue):
     sprayed: float
     landed: float
     missed: float
+    before: FloatArray | None = None
 
     @classmethod
     def on_tile(
@@ -77,6 +79,7 @@ class Film(FrozenValue):
         sprayed: float,
         landed: float,
         missed: float,
+        before: FloatArray | None = None,
     ) -> Self:
         """Makes a film and marks which cells the robot had to paint or keep clean.
 
@@ -92,6 +95,7 @@ class Film(FrozenValue):
             sprayed: See the class; m³.
             landed: See the class; m³.
             missed: See the class; m³.
+            before: See the class; m.
 
         Returns:
             The film.
@@ -119,6 +123,7 @@ class Film(FrozenValue):
             sprayed=sprayed,
             landed=landed,
             missed=missed,
+            before=before,
         )
 
 

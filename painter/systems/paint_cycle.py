@@ -1,6 +1,7 @@
 """The sequence of a paint cycle: phases, operator, faults."""
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -58,7 +59,12 @@ SEQUENCE = (
     Step(Phase.PAINT, Action.PAINT),
     Step(Phase.RETRACT, Action.MOVE, "retract"),
 )
-RETRACT_STEP = len(SEQUENCE) - 1
+# Where the wall is known from before, nothing is looked at.
+KNOWN_WALL_SEQUENCE = tuple(
+    step
+    for step in SEQUENCE
+    if step.phase not in (Phase.LOOK, Phase.SCAN) or step.action == Action.WORK
+)
 PLANNER = "motion_planner"
 STAGES = (PLANNER, "wall_finder", "wall_segmenter", "spray_path_planner")
 
@@ -68,7 +74,7 @@ class CycleState(FrozenValue):
     """State of a `PaintCycle`.
 
     Attributes:
-        step: Index in SEQUENCE.
+        step: Index in the cycle's sequence.
         since: When the step (or its motion) began, s.
         request: Last request to a stage.
         command: Last command to the path follower.
@@ -152,6 +158,7 @@ class PaintCycle(LeafSystem):
         period: float,
         look_time: float,
         time_limit: float,
+        sequence: Sequence[Step] = SEQUENCE,
     ) -> None:
         """Creates the cycle.
 
@@ -160,11 +167,13 @@ class PaintCycle(LeafSystem):
             period: Time between decisions, s.
             look_time: How long the arm stands still for first sight, s.
             time_limit: A cycle that lasts longer is a fault, s.
+            sequence: Steps of the cycle, the last one the retreat from the wall.
         """
         super().__init__()
         self._unattended = unattended
         self._look_time = look_time
         self._time_limit = time_limit
+        self._sequence = tuple(sequence)
         # Inputs.
         self._status_port = self.DeclareAbstractInputPort(
             "arm_status", Value(ArmStatus())
@@ -208,7 +217,7 @@ class PaintCycle(LeafSystem):
 
     def _CalcCameraEnabled(self, context: Context, output: BasicVector) -> None:
         now = self._GetState(context)
-        step = SEQUENCE[now.step]
+        step = self._sequence[now.step]
         looking = step.action == Action.HOLD or (
             step.phase in (Phase.LOOK, Phase.SCAN) and now.moving
         )
@@ -249,7 +258,7 @@ class PaintCycle(LeafSystem):
 
     def _CountStrokes(self, now: CycleState, follower: FollowerStatus) -> CycleState:
         """Keeps with which stroke the job would go on; the gun closes at once."""
-        painting = SEQUENCE[now.step].action == Action.PAINT and now.moving
+        painting = self._sequence[now.step].action == Action.PAINT and now.moving
         if not painting or follower.number != now.command.number:
             return now
         number = 1.0 + follower.strokes_done
@@ -267,7 +276,7 @@ class PaintCycle(LeafSystem):
             return now
         now = now.replace(operator_number=command.number)
         now = now.logged(time, "operator", word=command.word)
-        step = SEQUENCE[now.step]
+        step = self._sequence[now.step]
         if command.word == "abort":
             return self._Stopped(now, Phase.ABORTED, "aborted by the operator", time)
         if command.word == "pause":
@@ -310,8 +319,9 @@ class PaintCycle(LeafSystem):
             return now
         if now.status.phase == Phase.FAULT:
             return finished
-        if now.step != RETRACT_STEP or now.request.goal != "retract":
-            return now.replace(step=RETRACT_STEP).asking(PLANNER, "retract")
+        last = len(self._sequence) - 1
+        if now.step != last or now.request.goal != "retract":
+            return now.replace(step=last).asking(PLANNER, "retract")
         result = self._Result(context, PLANNER)
         if result.number != now.request.number:
             return now
@@ -323,7 +333,7 @@ class PaintCycle(LeafSystem):
         self, context: Context, now: CycleState, follower: FollowerStatus
     ) -> CycleState:
         time = context.get_time()
-        step = SEQUENCE[now.step]
+        step = self._sequence[now.step]
         if now.request.number == 0:
             return self._Entered(now, 0, time)
         if step.action == Action.REVIEW:
@@ -357,10 +367,10 @@ class PaintCycle(LeafSystem):
 
     def _Entered(self, now: CycleState, index: int, time: float) -> CycleState:
         """Returns the state at the beginning of a step, or at the end of all."""
-        if index == len(SEQUENCE):
+        if index == len(self._sequence):
             now = now.in_phase(Phase.DONE, time)
             return now.replace(status=now.status.replace(finished=True))
-        step = SEQUENCE[index]
+        step = self._sequence[index]
         now = now.replace(step=index, since=time, moving=False).in_phase(
             step.phase, time
         )

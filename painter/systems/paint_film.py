@@ -1,6 +1,7 @@
 """The paint that has landed; simulation only."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from pydrake.common.value import Value
@@ -39,6 +40,37 @@ class FilmState(FrozenValue):
     time: FloatArray
     dose: FloatArray
     trigger: float
+
+    @classmethod
+    def of_volume(
+        cls,
+        volume: FloatArray,
+        *,
+        cell: float,
+        origin: FloatArray,
+        sprayed: float = 0.0,
+        missed: float = 0.0,
+    ) -> Self:
+        """Makes a film before which the gun has not been yet; see the attributes."""
+        return cls(
+            volume=volume,
+            cell=cell,
+            origin=np.array(origin, dtype=float),
+            sprayed=sprayed,
+            missed=missed,
+            X_SG=None,
+            time=np.zeros(0),
+            dose=np.zeros(0),
+            trigger=0.0,
+        )
+
+    def same_grid(self, other: "FilmState") -> bool:
+        """Returns whether another film lies on the same cells."""
+        return (
+            self.volume.shape == other.volume.shape
+            and self.cell == other.cell
+            and bool(np.allclose(self.origin, other.origin))
+        )
 
     @property
     def thickness(self) -> FloatArray:
@@ -83,6 +115,7 @@ class PaintFilm(LeafSystem):
         X_WS: RigidTransform,
         tip: TipConfig,
         period: float = 0.01,
+        before: FilmState | None = None,
     ) -> None:
         """Creates the system.
 
@@ -93,9 +126,11 @@ class PaintFilm(LeafSystem):
             X_WS: Pose of the surface's frame in W; S z towards the robot.
             tip: The spray tip.
             period: Time between updates, s.
+            before: What is there already, on the same grid; None = nothing.
 
         Raises:
-            ValueError: The surface, the tip or `period` cannot be.
+            ValueError: The surface, the tip or `period` cannot be, or `before` lies on
+                another grid.
         """
         super().__init__()
         if not (np.isfinite(period) and period > 0.0):
@@ -110,18 +145,16 @@ class PaintFilm(LeafSystem):
         self._pose_port = self.DeclareAbstractInputPort("X_WG", Value(RigidTransform()))
         self._trigger_port = self.DeclareVectorInputPort("trigger", 1)
         # State.
-        bare = FilmState(
-            volume=np.zeros(height.shape),
-            cell=cell,
-            origin=np.array(origin, dtype=float),
-            sprayed=0.0,
-            missed=0.0,
-            X_SG=None,
-            time=np.zeros(0),
-            dose=np.zeros(0),
-            trigger=0.0,
-        )
-        self._film_index = self.DeclareAbstractState(Value(bare))
+        film = FilmState.of_volume(np.zeros(height.shape), cell=cell, origin=origin)
+        if before is not None:
+            if not film.same_grid(before):
+                raise ValueError(
+                    f"film of {before.volume.shape} cells of {before.cell} m from "
+                    f"{before.origin} m cannot go on as one of {height.shape} cells of "
+                    f"{cell} m from {film.origin} m."
+                )
+            film = before
+        self._film_index = self.DeclareAbstractState(Value(film))
         # Outputs.
         self.DeclareStateOutputPort("film", self._film_index)
         # Events.

@@ -1,5 +1,7 @@
 """The stage that plans the paint program."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context
@@ -7,7 +9,7 @@ from pydrake.systems.framework import Context
 from painter.errors import PainterError
 from painter.planning.config import TileConfig
 from painter.planning.program import ProgramPlanner
-from painter.planning.spray_path import PaintProgram
+from painter.planning.spray_path import PaintProgram, Stroke
 from painter.planning.tile import grid_shape
 from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
@@ -17,7 +19,7 @@ from perception.values import WallSegmentation
 
 
 class SprayPathPlanner(Stage):
-    """Plans strokes over the wall alone, and the motion that makes them.
+    """Plans strokes over the wall alone, or takes given ones, and their motion.
 
     .. pydrake_system::
 
@@ -45,6 +47,7 @@ class SprayPathPlanner(Stage):
         planner: ProgramPlanner,
         tile: TileConfig,
         period: float,
+        strokes: Sequence[Stroke] | None = None,
     ) -> None:
         """Creates the stage.
 
@@ -52,6 +55,7 @@ class SprayPathPlanner(Stage):
             planner: Of the robot and its settings.
             tile: Size that the segmentation must have.
             period: Time between looks at the request, s.
+            strokes: What is left to be sprayed; None = all of the wall.
 
         Raises:
             ValueError: A setting is out of bounds.
@@ -62,6 +66,7 @@ class SprayPathPlanner(Stage):
         super().__init__(stage="spray_path_planner", period=period)
         self._tile = tile
         self._planner = planner
+        self._strokes = strokes
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 10)
         self._segmentation_port = self.DeclareAbstractInputPort(
@@ -82,5 +87,7 @@ class SprayPathPlanner(Stage):
                 f"{segmentation.wall_mask.shape} cells, the tile {shape}."
             )
         q0 = np.array(self._state_port.Eval(context)[:5])
-        strokes = self._planner.strokes(segmentation)
+        strokes = self._strokes
+        if strokes is None:
+            strokes = self._planner.strokes(segmentation)
         return self._planner.program(strokes, segmentation, q0)

@@ -8,7 +8,8 @@ from painter.planning.deposition import best_pitch, mean_film, predicted_film
 from painter.planning.program import strokes_from
 from painter.planning.spray_path import Stroke
 from painter.planning.tile import cell_centres
-from painter.planning.touch_up import marked_cells, touch_up_strokes
+from painter.planning.touch_up import touch_up_strokes
+from painter.planning.zones import marked_cells
 
 TIP, RASTER = TipConfig(), RasterConfig()
 SHAPE, CELL = (200, 200), 0.01

@@ -9,7 +9,12 @@ from pydrake.systems.framework import DiagramBuilder
 
 from painter.errors import ReachError
 from painter.planning.spray_path import Motion, PaintProgram
-from painter.systems.paint_cycle import STAGES, PaintCycle
+from painter.systems.paint_cycle import (
+    KNOWN_WALL_SEQUENCE,
+    SEQUENCE,
+    STAGES,
+    PaintCycle,
+)
 from painter.systems.path_follower import PathFollower
 from painter.systems.stage import Stage
 from painter.systems.values import ArmStatus, DriveStatus, OperatorCommand, Phase
@@ -44,7 +49,9 @@ class ScriptedStage(Stage):
 class Rig:
     """Cycle, follower and scripted stages; the test plays operator and drives."""
 
-    def __init__(self, *, unattended=True, time_limit=60.0, **answers) -> None:
+    def __init__(
+        self, *, unattended=True, time_limit=60.0, sequence=SEQUENCE, **answers
+    ) -> None:
         program = PaintProgram(
             strokes=(),
             motion=still_motion([SPRAY]),
@@ -66,6 +73,7 @@ class Rig:
                 period=0.02,
                 look_time=0.5,
                 time_limit=time_limit,
+                sequence=sequence,
             ),
         )
         self.follower = builder.AddNamedSystem("follower", PathFollower(period=0.02))
@@ -142,6 +150,21 @@ def test_unattended_cycle_goes_through_all_phases():
     look = times[ALL.index("SCAN")] - times[ALL.index("LOOK")]
     # A move, the look, and a few decisions of 20 ms.
     assert look == pytest.approx(DURATION + 0.5, abs=0.2)
+
+
+def test_a_known_wall_is_painted_without_a_look_at_it():
+    rig = Rig(sequence=KNOWN_WALL_SEQUENCE)
+    looked = set()
+    rig.advance_until(
+        lambda: (
+            looked.add(float(rig.output(rig.cycle, "camera_enabled")[0]))
+            or rig.status.finished
+        )
+    )
+    assert rig.status.phase == Phase.DONE
+    assert looked == {0.0}
+    # Home, the program and the retreat.
+    assert rig.output(rig.follower, "status").number == 3
 
 
 def test_camera_is_wanted_in_look_and_scan_alone():

@@ -11,7 +11,7 @@ from painter.errors import PainterError
 from painter.planning.config import TileConfig, TipConfig
 from painter.planning.deposition import mean_film, raster_cv, stroke_profile
 from painter.planning.tile import nominal_tile_pose
-from painter.systems.paint_film import PaintFilm
+from painter.systems.paint_film import FilmState, PaintFilm
 
 TIP = TipConfig()
 CELL = 0.01
@@ -46,7 +46,9 @@ class GunScript(LeafSystem):
         output[0] = float(any(start <= t < end for start, end in self._spray_on))
 
 
-def paint(time, p_SGs, spray_on, *, height=None, tip=TIP, period=0.01, until=None):
+def paint(
+    time, p_SGs, spray_on, *, height=None, tip=TIP, period=0.01, until=None, before=None
+):
     """Runs a script to its end (and the valve's delay) and returns the film."""
     height = np.zeros((160, 160)) if height is None else height
     builder = DiagramBuilder()
@@ -60,6 +62,7 @@ def paint(time, p_SGs, spray_on, *, height=None, tip=TIP, period=0.01, until=Non
             X_WS=X_WS,
             tip=tip,
             period=period,
+            before=before,
         ),
     )
     for name in ("X_WG", "trigger"):
@@ -186,6 +189,27 @@ def test_a_box_shades_the_wall_behind_it():
 def test_a_closed_gun_leaves_the_film_alone():
     film = paint([0.0, 0.5], [[0.5, 0.5, 0.3], [0.5, 0.8, 0.3]], [])
     assert film.sprayed == film.missed == film.landed == 0.0
+
+
+def film_of(volume):
+    return FilmState.of_volume(
+        volume, cell=CELL, origin=np.full(2, -MARGIN), sprayed=3e-6, missed=1e-7
+    )
+
+
+def test_what_was_there_before_stays_and_counts():
+    script = [0.0, 0.5], [[0.5, 0.5, 0.3], [0.5, 0.8, 0.3]], [(0.1, 0.4)]
+    fresh = paint(*script)
+    volume = np.random.default_rng(1).uniform(0.0, 1e-8, (160, 160))
+    after = paint(*script, before=film_of(volume))
+    np.testing.assert_allclose(after.volume, fresh.volume + volume, atol=1e-15)
+    assert after.sprayed == pytest.approx(fresh.sprayed + 3e-6)
+    assert after.missed == pytest.approx(fresh.missed + 1e-7)
+
+
+def test_film_of_another_grid_is_refused():
+    with pytest.raises(ValueError, match=r"\(20, 20\) cells .* cannot go on"):
+        paint([0.0, 0.1], np.zeros((2, 3)), [], before=film_of(np.zeros((20, 20))))
 
 
 def test_trigger_beyond_its_range_is_an_error():
