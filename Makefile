@@ -67,7 +67,7 @@ $(STAMP): pyproject.toml constraints.txt
 	  || { echo "setup: no Python >= 3.11 with venv; set PYTHON=..." >&2; exit 1; }
 	[ -x $(BIN)/python ] || "$$python" -m venv $(VENV)
 	echo "setup: installing Python packages into $(VENV) (some minutes the first time)"
-	$(BIN)/python -m pip install -qq -c constraints.txt -e '.[dev,notebooks]'
+	$(BIN)/python -m pip install -qq -c constraints.txt -e '.[dev,hardware,notebooks]'
 	touch $@
 
 browser: ## Install Chromium, which the tests of report pages use

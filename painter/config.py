@@ -14,6 +14,7 @@ import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from pydrake.multibody.plant import MultibodyPlantConfig
 
+from painter.camera.config import CameraDriverConfig
 from painter.errors import InputError
 from painter.planning.config import (
     MotionConfig,
@@ -78,6 +79,7 @@ class WallCameraConfig:
         mount_error_m: Offset of the real mount from the modelled one along C's x, y
             and z; simulation only.
         mount_error_deg: Its rotation, roll, pitch and yaw about the same axes.
+        driver: How librealsense drives the real camera; not read in simulation.
     """
 
     rate: float = 5.0
@@ -86,6 +88,7 @@ class WallCameraConfig:
     stereo: StereoConfig = dataclasses.field(default_factory=StereoConfig)
     mount_error_m: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
     mount_error_deg: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
+    driver: CameraDriverConfig = dataclasses.field(default_factory=CameraDriverConfig)
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -166,6 +169,7 @@ class Scenario:
                 raise ValueError(f"wall_camera.{name} must have 3 numbers.")
         for part in (
             self.wall_camera.stereo,
+            self.wall_camera.driver,
             self.gun.tip,
             self.tile,
             self.scan,

@@ -17,7 +17,9 @@ IN_TREE = {
     "perception": {"perception"},
     "painter": set(),
     "painter.resources": {"painter_models"},
+    "painter.camera": {"painter.camera", "painter.errors", "perception"},
     "painter.config": {
+        "painter.camera.config",
         "painter.errors",
         "painter.planning.config",
         "painter.resources",
@@ -32,6 +34,7 @@ IN_TREE = {
         "perception.values",
     },
     "painter.systems": {
+        "painter.camera",
         "painter.canopen",
         "painter.errors",
         "painter.planning",
@@ -41,6 +44,7 @@ IN_TREE = {
         "perception",
     },
     "painter.diagrams": {
+        "painter.camera",
         "painter.canopen",
         "painter.config",
         "painter.diagrams",
@@ -72,6 +76,7 @@ PYDRAKE = {
         "pydrake.planning",
         "pydrake.trajectories",
     },
+    "painter.camera": set(),
     "painter.canopen": set(),
     "painter.errors": set(),
 }
@@ -79,10 +84,10 @@ PYDRAKE = {
 # The bus and the cameras belong to the robot's side: simulation runs without them.
 HARDWARE_PACKAGES = {"can", "canopen", "pyrealsense2"}
 HARDWARE_MODULES = {
+    "painter.camera.realsense",
     "painter.canopen",
     "painter.systems.canopen_arm",
     "painter.systems.canopen_gun",
-    "painter.systems.depth_camera_driver",
     "perception.bag_io",
 }
 

@@ -11,10 +11,12 @@ import yaml
 from pydrake.systems.framework import Diagram, LeafSystem
 
 import painter.systems
+from painter.camera.reader import Reading
 from painter.config import load_scenario
 from painter.diagrams.paint_cycle import MakePaintCycle
 from painter.diagrams.true_wall import true_segmentation
 from painter.planning.remainder import Remainder
+from painter.systems.realsense_camera import RealsenseCamera
 from painter.systems.stage import Stage
 
 MARK = ".. pydrake_system::"
@@ -69,8 +71,11 @@ def cycles():
 
 @pytest.fixture(scope="module")
 def instances(cycles):
-    """The systems of whole paint cycles, by class."""
-    return {type(dut): dut for cycle in cycles for dut in leaves(cycle.diagram)}
+    """The systems of whole paint cycles, and the robot's own, by class."""
+    size = {"width": 8, "height": 4, "color_width": 8, "color_height": 4}
+    robot = [RealsenseCamera(read=Reading, period=0.1, **size)]
+    found = [dut for cycle in cycles for dut in leaves(cycle.diagram)]
+    return {type(dut): dut for dut in [*found, *robot]}
 
 
 @pytest.mark.parametrize("kind", declared_classes(), ids=lambda kind: kind.__name__)

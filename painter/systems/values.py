@@ -59,6 +59,28 @@ class ArmStatus(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False)
+class CameraStatus(FrozenValue):
+    """State of the depth camera.
+
+    Attributes:
+        state: "starting", "streaming", "missing" (it is being opened again) or "lost".
+        problem: Why there are no pictures, in a line; empty while there are.
+        pictures: Pictures so far.
+        dropped: Pictures that were repeated or came too late.
+    """
+
+    state: str = "streaming"
+    problem: str = ""
+    pictures: int = 0
+    dropped: int = 0
+
+    @property
+    def fault(self) -> str | None:
+        """Says why the camera cannot be used, or None."""
+        return self.problem or None
+
+
+@dataclass(frozen=True, eq=False)
 class StageRequest(FrozenValue):
     """Asks a stage for work; a stage answers each `number` once.
 

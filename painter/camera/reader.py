@@ -1,0 +1,214 @@
+"""Reads a camera in a thread of its own: the newest picture, and how it fares."""
+
+import enum
+import importlib.util
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+
+from painter.camera.clock import CameraClock
+from painter.camera.config import CameraDriverConfig
+from painter.camera.frames import Camera, CameraError, CameraFrame, FrameSource
+from painter.errors import InputError
+from perception.depth import CameraIntrinsics
+
+_LOGGER = logging.getLogger(__name__)
+_WAIT = 0.1
+
+
+class CameraState(enum.StrEnum):
+    """What the camera does."""
+
+    STARTING = "starting"
+    STREAMING = "streaming"
+    MISSING = "missing"  # It is being opened again.
+    LOST = "lost"  # All tries have failed; nothing more is tried.
+
+
+@dataclass(frozen=True)
+class CameraHealth:
+    """How the camera fares since the reader began.
+
+    Attributes:
+        state: What it does.
+        problem: Why no pictures come; empty while they do.
+        pictures: Pictures that were handed on.
+        repeated: Pictures dropped because they were not newer than the one before.
+        late: Pictures dropped because they were too old when they arrived.
+        skipped: Pictures that the camera took and this computer never saw.
+        reconnects: How often the camera was opened again.
+    """
+
+    state: CameraState = CameraState.STARTING
+    problem: str = ""
+    pictures: int = 0
+    repeated: int = 0
+    late: int = 0
+    skipped: int = 0
+    reconnects: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """The newest of a camera.
+
+    Attributes:
+        frame: Newest picture; None before the first.
+        taken: When it was taken, by `time.monotonic()`, s.
+        health: How the camera fares.
+    """
+
+    frame: CameraFrame | None = None
+    taken: float = 0.0
+    health: CameraHealth = field(default_factory=CameraHealth)
+
+
+def camera_opener(
+    config: CameraDriverConfig,
+    wanted: CameraIntrinsics,
+    *,
+    baseline: float,
+    source: FrameSource | None = None,
+) -> Callable[[], Camera]:
+    """Returns a function that opens the camera that a scenario names.
+
+    Args:
+        config: The driver's settings.
+        wanted: Camera that the pictures are to be of.
+        baseline: Of its stereo imagers, m.
+        source: Feeds librealsense's software device instead of a camera, or None.
+
+    Raises:
+        InputError: pyrealsense2 is not installed.
+    """
+    if importlib.util.find_spec("pyrealsense2") is None:
+        raise InputError(
+            "the camera needs pyrealsense2; install it with: "
+            "pip install 'painter[hardware]'."
+        )
+    from painter.camera import realsense
+
+    if source is not None:
+        return lambda: realsense.SoftwareCamera(
+            source, config, wanted, baseline=baseline
+        )
+    if config.recording:
+        return lambda: realsense.open_recording(config, wanted)
+    return lambda: realsense.open_device(config, wanted)
+
+
+class CameraReader:
+    """The reading thread; a context manager that lets the camera go at its end."""
+
+    def __init__(
+        self, open_camera: Callable[[], Camera], config: CameraDriverConfig
+    ) -> None:
+        """Starts reading.
+
+        Args:
+            open_camera: Opens the camera, as often as it is lost.
+            config: Latency, ages and tries.
+        """
+        self._open_camera = open_camera
+        self._config = config
+        self._reading = Reading()
+        self._end = threading.Event()
+        self._thread = threading.Thread(
+            target=self._run, name="painter camera", daemon=True
+        )
+        self._thread.start()
+
+    def __enter__(self) -> "CameraReader":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def read(self) -> Reading:
+        """Returns the newest; never waits."""
+        return self._reading  # One reference, replaced whole.
+
+    def close(self) -> None:
+        """Ends the thread and lets the camera go."""
+        self._end.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        config, tries = self._config, 0
+        while not self._end.is_set():
+            count = self._reading.health.pictures
+            try:
+                self._stream()
+            except CameraError as error:
+                problem = str(error)
+            else:
+                return
+            tries = 0 if self._reading.health.pictures > count else tries
+            _LOGGER.warning("%s", problem)
+            if tries >= config.retries:
+                self._tell(
+                    state=CameraState.LOST,
+                    problem=f"{problem} Given up after {tries} tries.",
+                )
+                return
+            tries += 1
+            self._tell(
+                state=CameraState.MISSING,
+                problem=f"{problem} Try {tries} of {config.retries} follows.",
+                reconnects=self._reading.health.reconnects + 1,
+            )
+            self._end.wait(config.retry_period)
+
+    def _stream(self) -> None:
+        """Opens the camera and hands its pictures on; returns when asked to end."""
+        camera = self._open_camera()
+        clock, number = CameraClock(self._config.latency), None
+        heard = time.monotonic()
+        try:
+            while not self._end.is_set():
+                frame = camera.wait(_WAIT)
+                now = time.monotonic()
+                if frame is None:
+                    if now - heard > self._config.silence:
+                        raise CameraError(
+                            f"camera: no picture for {self._config.silence:g} s."
+                        )
+                    continue
+                heard = now
+                self._take(frame, clock.map(frame.time, now), now, number)
+                number = frame.number
+        finally:
+            camera.close()
+
+    def _take(
+        self, frame: CameraFrame, taken: float | None, now: float, number: int | None
+    ) -> None:
+        health = self._reading.health
+        missed = 0 if number is None else max(0, frame.number - number - 1)
+        health = replace(health, skipped=health.skipped + missed)
+        if taken is None:
+            health = replace(health, repeated=health.repeated + 1)
+        elif now - taken > self._config.max_age:
+            health = replace(health, late=health.late + 1)
+        else:
+            health = replace(
+                health,
+                state=CameraState.STREAMING,
+                problem="",
+                pictures=health.pictures + 1,
+            )
+            self._reading = Reading(frame, taken, health)
+            return
+        self._reading = replace(self._reading, health=health)
+
+    def _tell(self, **changes: object) -> None:
+        health = replace(self._reading.health, **changes)  # type: ignore[arg-type]
+        self._reading = replace(self._reading, health=health)

@@ -1,0 +1,348 @@
+"""librealsense: a device, a recording, or its software device fed with pictures.
+
+All three are a librealsense device whose sensors are opened, set and filtered by the
+same code, so that tests without a camera run what the robot runs.
+"""
+
+import logging
+import math
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyrealsense2 as rs
+
+from painter.camera.config import CameraDriverConfig
+from painter.camera.frames import CameraError, CameraFrame, ColorArray, FrameSource
+from perception.depth import CameraIntrinsics
+from perception.pinhole import PinholeMap
+
+_LOGGER = logging.getLogger(__name__)
+_QUEUE = 4
+_DEPTH_UNIT = 0.001
+
+
+def open_device(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSense":
+    """Opens a camera on USB.
+
+    Raises:
+        CameraError: There is none, or not the one of that serial number.
+    """
+    devices = list(rs.context().query_devices())
+    serials = [device.get_info(rs.camera_info.serial_number) for device in devices]
+    if not devices:
+        raise CameraError("camera: no RealSense device is connected.")
+    if config.serial and config.serial not in serials:
+        raise CameraError(
+            f"camera: serial number {config.serial} is not connected; "
+            f"there are {', '.join(serials)}."
+        )
+    number = serials.index(config.serial) if config.serial else 0
+    return RealSense(devices[number], config, wanted, name=serials[number])
+
+
+def open_recording(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSense":
+    """Opens a recording, played at the rate it was taken at.
+
+    Raises:
+        CameraError: It is missing, damaged, or has no depth.
+    """
+    if not Path(config.recording).is_file():
+        raise CameraError(f"camera: {config.recording}: no such recording.")
+    try:
+        device = rs.context().load_device(config.recording)
+    except RuntimeError as error:
+        raise CameraError(f"camera: {config.recording}: {_line(error)}") from error
+    return RealSense(device, config, wanted, name=config.recording)
+
+
+class RealSense:
+    """An open librealsense device; a `Camera`."""
+
+    def __init__(
+        self, device: Any, config: CameraDriverConfig, wanted: CameraIntrinsics, *,
+        name: str,
+    ) -> None:  # fmt: skip
+        """Sets the device and starts its streams.
+
+        Args:
+            device: A librealsense device.
+            config: Preset, exposure, filters.
+            wanted: Camera that pictures are mapped to.
+            name: Of the device, in messages.
+
+        Raises:
+            CameraError: It has no depth of the wanted size, or refuses a setting.
+        """
+        self._device = device
+        self._name = name
+        self._config = config
+        self._filters = make_filters(config)
+        self._open: list[Any] = []
+        self._color: ColorArray | None = None
+        self._colors = rs.frame_queue(_QUEUE, True)
+        self._depths = rs.frame_queue(_QUEUE, True)
+        try:
+            sensor, profile = self._find(rs.stream.depth, rs.format.z16, wanted)
+            apply_options(sensor, config)
+            self._map = PinholeMap(_intrinsics(name, profile), wanted)
+            self._unit_mm = 1e3 * sensor.get_option(rs.option.depth_units)
+            self._start(sensor, profile, self._depths)
+            if config.color:
+                found = self._find_color(wanted)
+                if found is None:
+                    _LOGGER.info("camera %s has no colour of the wanted size.", name)
+                else:
+                    self._start(*found, self._colors)
+        except RuntimeError as error:
+            self.close()
+            raise CameraError(f"camera {name}: {_line(error)}") from error
+        except CameraError:
+            self.close()
+            raise
+
+    def wait(self, timeout: float) -> CameraFrame | None:
+        """Returns the next picture; None if none came within `timeout` s.
+
+        Raises:
+            CameraError: The camera is gone.
+        """
+        try:
+            there, frame = self._depths.try_wait_for_frame(max(1, int(1e3 * timeout)))
+            if not there:
+                if self._device.is_playback() or self._device.is_connected():
+                    return None
+                raise CameraError(f"camera {self._name}: it was unplugged.")
+            for step in self._filters:
+                frame = step.process(frame)
+            while (color := self._colors.poll_for_frame()).is_frame():
+                self._color = np.array(color.get_data())
+            depth = np.array(frame.get_data())
+        except RuntimeError as error:
+            raise CameraError(f"camera {self._name}: {_line(error)}") from error
+        if self._unit_mm != 1.0:
+            scaled = np.rint(depth * self._unit_mm)
+            depth = np.where(scaled > 65535, 0, scaled).astype(np.uint16)
+        return CameraFrame(
+            depth_mm=self._map.apply(depth),
+            color=self._color,
+            time=1e-3 * frame.get_timestamp(),
+            number=frame.get_frame_number(),
+        )
+
+    def close(self) -> None:
+        """Stops the streams and lets the device go."""
+        while self._open:
+            sensor = self._open.pop()
+            with suppress(RuntimeError):  # A device that was unplugged is stopped.
+                sensor.stop()
+            with suppress(RuntimeError):
+                sensor.close()
+
+    def _start(self, sensor: Any, profile: Any, queue: Any) -> None:
+        sensor.open(profile)
+        self._open.append(sensor)
+        sensor.start(queue)
+
+    def _find(
+        self, stream: Any, form: Any, wanted: CameraIntrinsics
+    ) -> tuple[Any, Any]:
+        """Returns the sensor and profile of a stream of the wanted size and rate."""
+        offers = []
+        for sensor in self._device.query_sensors():
+            for profile in sensor.get_stream_profiles():
+                if profile.stream_type() != stream or profile.format() != form:
+                    continue
+                video = profile.as_video_stream_profile()
+                offers.append((video.width(), video.height(), video.fps()))
+                if offers[-1] == (wanted.width, wanted.height, self._config.fps):
+                    return sensor, profile
+        shown = ", ".join(sorted({f"{w} x {h} at {fps} Hz" for w, h, fps in offers}))
+        raise CameraError(
+            f"camera {self._name}: no {stream.name} of {wanted.width} x "
+            f"{wanted.height} at {self._config.fps} Hz; it has {shown or 'none'}."
+        )
+
+    def _find_color(self, wanted: CameraIntrinsics) -> tuple[Any, Any] | None:
+        try:
+            return self._find(rs.stream.color, rs.format.rgb8, wanted)
+        except CameraError:
+            return None
+
+
+class SoftwareCamera:
+    """librealsense's software device, fed from a source; a `Camera`."""
+
+    def __init__(
+        self,
+        source: FrameSource,
+        config: CameraDriverConfig,
+        wanted: CameraIntrinsics,
+        *,
+        baseline: float,
+    ) -> None:
+        """Makes the device and opens it as one on USB would be.
+
+        Args:
+            source: Where pictures come from.
+            config: Preset, exposure, filters.
+            wanted: Camera that the source's pictures are of.
+            baseline: Of the stereo imagers, m; the filters work in disparity.
+
+        Raises:
+            CameraError: The device refuses a setting.
+        """
+        self._source = source
+        self._shape = (wanted.height, wanted.width)
+        self._number = 0
+        self._device = rs.software_device()
+        self._depth = self._device.add_sensor("Stereo Module")
+        self._depth_profile = self._depth.add_video_stream(
+            _stream(rs.stream.depth, rs.format.z16, 2, wanted, config.fps), True
+        )
+        self._depth.add_read_only_option(rs.option.depth_units, _DEPTH_UNIT)
+        self._depth.add_read_only_option(rs.option.stereo_baseline, 1e3 * baseline)
+        for option, most in (
+            (rs.option.visual_preset, 6),
+            (rs.option.exposure, 200_000),
+            (rs.option.enable_auto_exposure, 1),
+            (rs.option.emitter_enabled, 2),
+        ):
+            limits = rs.option_range()
+            limits.min, limits.max, limits.step, limits.default = 0, most, 1, 0
+            self._depth.add_option(option, limits, True)
+        self._rgb = self._device.add_sensor("RGB Camera")
+        self._rgb_profile = self._rgb.add_video_stream(
+            _stream(rs.stream.color, rs.format.rgb8, 3, wanted, config.fps), True
+        )
+        self._has_color = config.color
+        self._camera = RealSense(self._device, config, wanted, name="software device")
+
+    def wait(self, timeout: float) -> CameraFrame | None:
+        """Feeds the device with the source's next picture and returns what it makes.
+
+        Raises:
+            CameraError: The source is gone, or its picture is not of the camera's size.
+        """
+        start = time.monotonic()
+        found = self._source.wait_frame(timeout)
+        if found is None:
+            return None
+        depth, color, when = found
+        self._number += 1
+        if color is not None and self._has_color:
+            self._push(self._rgb, self._rgb_profile, color, when)
+        self._push(self._depth, self._depth_profile, depth, when)
+        return self._camera.wait(max(0.1, timeout - (time.monotonic() - start)))
+
+    def close(self) -> None:
+        """Stops the device."""
+        self._camera.close()
+
+    def _push(
+        self, sensor: Any, profile: Any, pixels: np.ndarray[Any, Any], when: float
+    ) -> None:
+        if pixels.shape[:2] != self._shape:
+            raise CameraError(
+                f"camera source: a picture of {pixels.shape[:2]}, not {self._shape}."
+            )
+        frame = rs.software_video_frame()
+        frame.pixels = np.ascontiguousarray(pixels)
+        frame.bpp = pixels.itemsize * math.prod(pixels.shape[2:])
+        frame.stride = frame.bpp * pixels.shape[1]
+        frame.timestamp = 1e3 * when
+        frame.domain = rs.timestamp_domain.hardware_clock
+        frame.frame_number = self._number
+        frame.profile = profile.as_video_stream_profile()
+        if pixels.ndim == 2:
+            frame.depth_units = _DEPTH_UNIT
+        sensor.on_video_frame(frame)
+
+
+def make_filters(config: CameraDriverConfig) -> list[Any]:
+    """Returns librealsense's filters in the order they run."""
+    filters = [rs.threshold_filter(config.threshold_min, config.threshold_max)]
+    middle = []
+    if config.spatial:
+        middle.append(
+            rs.spatial_filter(
+                config.spatial_alpha, config.spatial_delta, config.spatial_magnitude, 0
+            )
+        )
+    if config.temporal:
+        middle.append(
+            rs.temporal_filter(
+                config.temporal_alpha,
+                config.temporal_delta,
+                config.temporal_persistence,
+            )
+        )
+    if middle:
+        filters += [
+            rs.disparity_transform(True), *middle, rs.disparity_transform(False)
+        ]  # fmt: skip
+    return filters
+
+
+def apply_options(sensor: Any, config: CameraDriverConfig) -> None:
+    """Sets preset, exposure and emitter, reads back and compares.
+
+    The preset is first: it sets the others to its own. Options that a sensor does not
+    have, such as a recording's, are logged.
+
+    Raises:
+        CameraError: The sensor does not keep a value; names option and values.
+    """
+    preset = int(getattr(rs.rs400_visual_preset, config.preset))
+    values = [(rs.option.visual_preset, preset)]
+    if config.exposure > 0.0:
+        values.append((rs.option.enable_auto_exposure, 0))
+        values.append((rs.option.exposure, round(1e6 * config.exposure)))
+    else:
+        values.append((rs.option.enable_auto_exposure, 1))
+    values.append((rs.option.emitter_enabled, int(config.emitter)))
+    for option, value in values:
+        if not sensor.supports(option) or sensor.is_option_read_only(option):
+            _LOGGER.info("camera: %s cannot be set.", option.name)
+            continue
+        limits = sensor.get_option_range(option)
+        if not limits.min <= value <= limits.max:
+            raise CameraError(
+                f"camera: {option.name} must be {limits.min:g} to {limits.max:g}, "
+                f"got {value}."
+            )
+        sensor.set_option(option, value)
+        found = sensor.get_option(option)
+        if abs(found - value) > max(limits.step, 0.5):
+            raise CameraError(
+                f"camera: {option.name} was set to {value} and reads {found:g}."
+            )
+
+
+def _stream(kind: Any, form: Any, size: int, camera: CameraIntrinsics, fps: int) -> Any:
+    stream = rs.video_stream()
+    stream.type, stream.fmt, stream.bpp = kind, form, size
+    stream.uid, stream.index, stream.fps = int(kind), 0, fps
+    stream.width, stream.height = camera.width, camera.height
+    lens = rs.intrinsics()
+    lens.width, lens.height = camera.width, camera.height
+    lens.fx, lens.fy, lens.ppx, lens.ppy = camera.fx, camera.fy, camera.cx, camera.cy
+    lens.model, lens.coeffs = rs.distortion.none, [0.0] * 5
+    stream.intrinsics = lens
+    return stream
+
+
+def _intrinsics(name: str, profile: Any) -> CameraIntrinsics:
+    lens = profile.as_video_stream_profile().get_intrinsics()
+    if any(lens.coeffs):
+        raise CameraError(f"camera {name}: its depth is distorted, not rectified.")
+    return CameraIntrinsics(
+        fx=lens.fx, fy=lens.fy, cx=lens.ppx, cy=lens.ppy,
+        width=lens.width, height=lens.height,
+    )  # fmt: skip
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
