@@ -66,6 +66,7 @@ class ArmBus:
         )
         self.phase = Phase.DOWN
         self.reason = ""
+        self._stopped_at = 0.0
         # Called right before each SYNC, to take its time.
         self.before_sync: Callable[[], None] | None = None
         # Called with what all drives measured at a SYNC: its due time, q, v, trigger.
@@ -111,7 +112,7 @@ class ArmBus:
             raise BusError(f"cannot acknowledge, the bus is still lost: {self.reason}")
         if self.io.inputs is not None and not self.io.is_chain_closed:
             raise BusError("cannot acknowledge: the e-stop chain is open.")
-        self.reason = ""
+        self.reason, self._stopped_at = "", 0.0
         self._follower.release()
         self._begin(self._start_up([n for n in self.nodes if not self._is_sound(n)]))
 
@@ -134,7 +135,7 @@ class ArmBus:
         """
         was, self.io.trigger = self.phase, 0.0
         if not self.reason:
-            self.reason = reason
+            self.reason, self._stopped_at = reason, self._now
             _LOGGER.warning("stopped: %s", reason)
         self.phase = Phase.STOPPED
         if self._script is not None:
@@ -213,6 +214,7 @@ class ArmBus:
             time=self._now,
             phase=self.phase,
             reason=self.reason,
+            stopped_at=self._stopped_at,
             q=q,
             v=v,
             q_commanded=self._follower.q.copy(),

@@ -27,6 +27,7 @@ from painter.canopen.frame_log import FrameLogger, TappedLink
 from painter.canopen.links import Link, open_link
 from painter.canopen.mailbox import Mailbox
 from painter.canopen.realtime import Lateness, Ticker, settle_memory, use_fifo
+from painter.canopen.sample_ring import SampleRing, Samples
 from painter.canopen.setpoints import Setpoint
 from painter.errors import BusError, PainterError
 
@@ -62,6 +63,7 @@ class BusLoop:
         bus: BusConfig,
         commands: Connection,
         mailbox: Mailbox,
+        ring: SampleRing,
         log: Connection | None = None,
     ) -> None:
         """Connects to the bus.
@@ -70,6 +72,7 @@ class BusLoop:
             bus: What is on the bus.
             commands: Where commands come from.
             mailbox: Where reports go.
+            ring: Where measured samples go.
             log: Pipe of a `FrameLogger`, or None.
 
         Raises:
@@ -81,7 +84,8 @@ class BusLoop:
         self._commands = commands
         self._mailbox = mailbox
         self._ticker = Ticker(bus.cycle)
-        self._master.before_sync = self._ticker.note
+        self._master.before_sync = self._ticker.meet
+        self._master.measured = ring.put
         self._refusal = ""
         self._lateness: Lateness | None = None
         self._is_fifo = False
@@ -186,10 +190,11 @@ class BusProcess:
         context = multiprocessing.get_context("spawn")
         theirs, self._commands = context.Pipe(duplex=False)
         self._mailbox = Mailbox()
+        self._ring = SampleRing()
         self._errors, errors = context.Pipe(duplex=False)
         self._process = context.Process(
             target=_run,
-            args=(bus, theirs, self._mailbox.name, errors, pipe),
+            args=(bus, theirs, self._mailbox.name, self._ring.name, errors, pipe),
             name="painter bus",
             daemon=False,
         )
@@ -253,6 +258,18 @@ class BusProcess:
         found = self._mailbox.get()
         return None if found is None else found[1]
 
+    def samples(self, since: float) -> Samples:
+        """Returns what was measured after a time, s on the bus's clock."""
+        return self._ring.since(since)
+
+    def now(self) -> float:
+        """Returns the bus's clock, s: the machine's monotonic one."""
+        return time.monotonic()
+
+    def wait_until(self, when: float) -> None:
+        """Waits for a time, s, of the bus's clock."""
+        time.sleep(max(0.0, when - time.monotonic()))
+
     def close(self) -> None:
         """Switches the arm off and ends the process."""
         with contextlib.suppress(BusError):
@@ -264,6 +281,7 @@ class BusProcess:
             self._process.join()
         self._commands.close()
         self._mailbox.close()
+        self._ring.close()
         if self._logger is not None:
             self._logger.close()
 
@@ -291,16 +309,18 @@ def _run(
     bus: BusConfig,
     commands: Connection,
     mailbox_name: str,
+    ring_name: str,
     errors: Connection,
     log: Connection | None,
 ) -> None:
     """The bus process: Ctrl-C is the parent's business, which then ends the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    mailbox = Mailbox(name=mailbox_name)
+    mailbox, ring = Mailbox(name=mailbox_name), SampleRing(name=ring_name)
     try:
-        BusLoop(bus, commands, mailbox, log).run()
+        BusLoop(bus, commands, mailbox, ring, log).run()
     except PainterError as error:
         errors.send(str(error))
         os._exit(1)
     finally:
         mailbox.close()
+        ring.close()

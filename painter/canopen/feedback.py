@@ -63,6 +63,7 @@ class Feedback:
         time: Clock of the bus, s.
         phase: What the bus does.
         reason: Why it stopped; empty while it did not.
+        stopped_at: When it stopped, s; 0 while it did not.
         q: (5,) measured joint positions, rad.
         v: (5,) measured joint speeds, rad/s.
         q_commanded: (5,) rad, as sent to the drives.
@@ -77,6 +78,7 @@ class Feedback:
     time: float
     phase: Phase
     reason: str
+    stopped_at: float
     q: FloatArray
     v: FloatArray
     q_commanded: FloatArray

@@ -21,13 +21,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant
-from pydrake.systems.controllers import InverseDynamicsController
 from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import (
-    Demultiplexer,
-    DiscreteDerivative,
-    SharedPointerSystem,
-)
 from pydrake.systems.sensors import RgbdSensor
 
 from painter.config import Scenario
@@ -37,8 +31,8 @@ from painter.diagrams.arm_model import (
     X_W_FLOOR,
     AddRobot,
     GetArmKinematics,
-    MakeArmPlant,
 )
+from painter.diagrams.joint_loop import AddJointLoop
 from painter.planning.tile import nominal_tile_pose
 from painter.scene.config import Scene
 from painter.scene.load import load_scene
@@ -52,14 +46,11 @@ from painter.systems.simulated_drives import SimulatedDrives
 from painter.systems.stereo_camera import StereoCamera, render_camera_info
 from perception.depth import CameraIntrinsics
 
-NQ = 5
 # Renderers: what light sees, and the same with panes of glass opaque.
 SCENE_RENDERER = "scene"
 GLASS_RENDERER = "with_glass"
 FILM_CELL = 0.01
 FILM_MARGIN = 0.35
-# The drives differentiate their velocity set-point over this time for feed-forward.
-FEED_FORWARD_PERIOD = 0.004
 
 
 def MakeSimStation(
@@ -159,45 +150,18 @@ def _AddClearance(
 def _AddDrives(
     builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario
 ) -> None:
-    """Adds encoders and the joint loops: PID with inverse-dynamics feed-forward."""
+    """Adds encoders, the drives' joint loops and what the drives report."""
     arm = plant.GetModelInstanceByName("arm")
-    model = builder.AddNamedSystem(
-        "controller_plant", SharedPointerSystem(MakeArmPlant(scenario.directives))
-    ).get()
-    gains = scenario.arm.gains
-    controller = builder.AddNamedSystem(
-        "joint_pid",
-        InverseDynamicsController(
-            robot=model,
-            kp=np.full(NQ, gains.kp),
-            ki=np.full(NQ, gains.ki),
-            kd=np.full(NQ, gains.kd),
-            has_reference_acceleration=True,
-        ),
-    )
     encoder = builder.AddNamedSystem(
         "joint_encoder", JointEncoder(bits=scenario.arm.encoder_bits)
     )
     faults = [(fault.time, fault.joint, fault.code) for fault in scenario.arm.faults]
     drives = builder.AddNamedSystem("drives", SimulatedDrives(faults=faults))
-    split = builder.AddNamedSystem("desired_split", Demultiplexer(2 * NQ, NQ))
-    acceleration = builder.AddNamedSystem(
-        "feed_forward", DiscreteDerivative(NQ, FEED_FORWARD_PERIOD)
-    )
     builder.Connect(plant.get_state_output_port(arm), encoder.GetInputPort("state"))
     estimated = encoder.GetOutputPort("state_estimated")
-    builder.Connect(estimated, controller.get_input_port_estimated_state())
     builder.Connect(estimated, drives.GetInputPort("state_estimated"))
-    builder.Connect(split.get_output_port(1), acceleration.get_input_port())
-    builder.Connect(
-        acceleration.get_output_port(),
-        controller.get_input_port_desired_acceleration(),
-    )
-    builder.Connect(
-        controller.get_output_port_control(), plant.get_actuation_input_port(arm)
-    )
-    builder.ExportInput(controller.get_input_port_desired_state(), "arm.desired_state")
-    builder.ConnectInput("arm.desired_state", split.get_input_port())
+    desired = AddJointLoop(builder, plant, scenario, estimated)
+    builder.ExportInput(desired, "arm.desired_state")
     builder.ConnectInput("arm.desired_state", drives.GetInputPort("desired_state"))
     builder.ExportOutput(estimated, "arm.state_estimated")
     builder.ExportOutput(drives.GetOutputPort("status"), "arm.status")

@@ -186,12 +186,16 @@ class SimDrive(SimNode):
             self.state, self._next = self._next[0], None
             if self.state == State.ENABLED:
                 self._hold_here()
-        if self.state in _POWERED:
-            self._move(dt)
+        # While the brake opens, the motor holds: else the arm would sag.
+        opening = self._next is not None
+        if self.state in _POWERED or opening:
+            if not opening:
+                self._move(dt)
             self.motor.drive(
                 self.demand.position - self._offset, self.demand.velocity, dt
             )
-            self._watch_following(now)
+            if not opening:
+                self._watch_following(now)
         else:
             self.motor.coast(dt, brake=self.brake_closed)
             self.demand.hold(self.position)
@@ -267,6 +271,7 @@ class SimDrive(SimNode):
         if number == 4:
             if not self.brake_stuck:
                 self.brake_closed = False
+                self._hold_here()
                 self._next = (state, self.now + self.brake_time)
         elif number in (5, 8):
             option = self.store.number(0x605C if number == 5 else 0x605B)

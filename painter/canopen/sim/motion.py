@@ -69,12 +69,15 @@ class SyncedTarget:
         self, demand: Demand, target: float, *, now: float, period: float, speed: float
     ) -> bool:
         """Takes a target for one period; returns whether the speed limit cut it."""
-        step = target - demand.position
+        # A SYNC some microseconds early or late is still the end of the last line.
+        is_next = 0.5 * self._period < now - self._since < 1.5 * self._period
+        start = self._target if is_next else demand.position
+        step = target - start
         most = speed * period
         cut = abs(step) > most * 1.01 + 1.0
         if cut:
             step = math.copysign(most, step)
-        self._start, self._target = demand.position, demand.position + step
+        self._start, self._target = start, start + step
         self._since, self._period = now, period
         return cut
 

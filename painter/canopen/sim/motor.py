@@ -51,3 +51,35 @@ class Motor:
         loss = min(abs(self.velocity), self.friction * dt)
         self.velocity -= loss if self.velocity > 0.0 else -loss
         self.position += self.velocity * dt
+
+
+@dataclass
+class LoadedMotor(Motor):
+    """A motor whose motion a load works out: keeps what the load is to do.
+
+    Attributes:
+        demand: Where the axis shall be, counts.
+        demand_velocity: How fast it shall go, counts/s.
+        is_held: Whether the brake, or what blocks the axis, holds it at `demand`.
+    """
+
+    demand: float = 0.0
+    demand_velocity: float = 0.0
+    is_held: bool = True
+
+    def drive(self, demand: float, demand_velocity: float, dt: float) -> None:
+        """Asks the load for a motion under power."""
+        if self.is_blocked:
+            self._hold()
+            return
+        self.demand, self.demand_velocity = demand, demand_velocity
+        self.is_held = False
+
+    def coast(self, dt: float, *, brake: bool) -> None:
+        """Asks the load to hold: the brake closes as power goes."""
+        self._hold()
+
+    def _hold(self) -> None:
+        if not self.is_held:
+            self.demand, self.demand_velocity = self.position, 0.0
+            self.is_held = True

@@ -3,11 +3,15 @@
 import enum
 from collections import deque
 
+import numpy as np
+
 from painter.canopen.bus_config import BusConfig
 from painter.canopen.frames import ERROR_BUS_OFF, Frame
 from painter.canopen.links import LinkError
 from painter.canopen.sim.drive import SimDrive
 from painter.canopen.sim.io_node import SimIo
+from painter.canopen.sim.load import Load
+from painter.canopen.sim.motor import LoadedMotor
 from painter.canopen.sim.node import SimNode
 from painter.canopen.sim.wire import Wire
 from painter.canopen.units import AXES
@@ -36,11 +40,13 @@ class Fault(enum.StrEnum):
 class Rack:
     """The simulated nodes of a bus, in simulated time."""
 
-    def __init__(self, bus: BusConfig) -> None:
+    def __init__(self, bus: BusConfig, load: Load | None = None) -> None:
         """Creates all drives and the I/O node, before their boot-up.
 
         Args:
             bus: What is on the bus; drives have the objects of their EDS.
+            load: What the motors move, and where they stand; None = motors alone, each
+                with its own inertia, at position 0.
         """
         self.bus = bus
         self.wire = Wire(bus.bitrate)
@@ -59,6 +65,15 @@ class Rack:
         self.io = SimIo(bus.io.node_id, self.wire)
         self.link = WireLink(self)
         self.now = 0.0
+        self._load = load
+        if load is not None:
+            self._motors = [LoadedMotor() for _ in AXES]
+            self._units = [config.units() for config in bus.axis_drives()]
+            self._take_motion(load)
+            for drive, motor in zip(self.drives.values(), self._motors, strict=True):
+                motor.demand = motor.position
+                drive.motor = motor
+                drive.on_reset()
 
     @property
     def nodes(self) -> list[SimNode]:
@@ -72,7 +87,32 @@ class Rack:
             self.wire.advance(self.now)
             for node in self.nodes:
                 node.step(self.now)
+            if self._load is not None:
+                self._move(self._load)
         self.wire.advance(until)
+
+    def _move(self, load: Load) -> None:
+        """Lets the load follow what the drives ask of it."""
+        pairs = list(zip(self._units, self._motors, strict=True))
+        load.step(
+            np.array([unit.angle(motor.demand) for unit, motor in pairs]),
+            np.array(
+                [
+                    unit.sign * motor.demand_velocity / unit.counts_per_rad
+                    for unit, motor in pairs
+                ]
+            ),
+            STEP,
+        )
+        self._take_motion(load)
+
+    def _take_motion(self, load: Load) -> None:
+        for unit, motor, q, v in zip(
+            self._units, self._motors, *load.axes(), strict=True
+        ):
+            scale = unit.sign * unit.counts_per_rad
+            motor.position = (float(q) - unit.zero) * scale
+            motor.velocity = float(v) * scale
 
     def inject(self, fault: Fault, axis: str = "base_yaw") -> None:
         """Makes a fault happen now.
