@@ -1,6 +1,7 @@
 """Joint-space motion: blends within the joints' limits, and chaining into a Motion."""
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -15,6 +16,10 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 
 _POSITION_MARGIN = 0.02  # rad, kept off a joint's end by plans.
 _SHORTEST_MOVE = 0.05  # s; a move of no length still lasts a few samples.
+# Share of the time in which a move speeds up, by which the acceleration rises, and
+# falls again: 0.1 s where a stretched arm starts off, so that drives can follow.
+_TRAVEL_RAMP = 0.2
+_SHORTEST_CRUISE = 1e-6  # s; a shorter one is rounding.
 _LONGEST_BLEND = 8.0  # s
 _SAMPLES = 33  # Of a blend, where its rates are looked at.
 # The peak between two samples may exceed what is seen at them a little.
@@ -66,6 +71,60 @@ class JointBlend(FrozenValue):
         return np.asarray(q[0])
 
 
+@dataclass(frozen=True, eq=False)
+class JointTravel(FrozenValue):
+    """A `Segment` straight from rest to rest: it speeds up, cruises and slows down.
+
+    While it speeds up the acceleration rises to a plateau and falls again, linearly;
+    slowing down is the same backwards. All joints share one law of time.
+
+    Attributes:
+        q0: (5,) rad, at its start.
+        q1: (5,) rad, at its end.
+        speed_up: How long it speeds up, and slows down again, s.
+        cruise: How long it goes at constant rates between, s; may be 0.
+    """
+
+    q0: FloatArray
+    q1: FloatArray
+    speed_up: float
+    cruise: float
+
+    @property
+    def duration(self) -> float:
+        """Length in time, s."""
+        return 2.0 * self.speed_up + self.cruise
+
+    @property
+    def knots(self) -> FloatArray:
+        """See `Segment.knots`."""
+        ramp = _TRAVEL_RAMP
+        begin = self.speed_up * np.array([0.0, ramp, 1.0 - ramp, 1.0])
+        end = self.duration - begin[::-1]
+        # Without a cruise the first of the end is the last of the beginning.
+        return np.concatenate([begin, end[0 if self.cruise else 1 :]])
+
+    def q(self, time: FloatArray) -> FloatArray:
+        """See `Segment.q`."""
+        t = np.clip(np.asarray(time, dtype=float), 0.0, self.duration)
+        near_start = t <= 0.5 * self.duration
+        way = self._way(np.where(near_start, t, self.duration - t))
+        share = np.where(near_start, way, 1.0 - way)[:, None]
+        return np.asarray((1.0 - share) * self.q0 + share * self.q1)
+
+    def _way(self, t: FloatArray) -> FloatArray:
+        """Returns the share of the way that is gone at `t`, in the first half, s."""
+        rise, ramp = self.speed_up, _TRAVEL_RAMP * self.speed_up
+        rate = 1.0 / (rise + self.cruise)
+        acceleration = rate / (rise - ramp)
+        rising = acceleration * t**3 / (6.0 * ramp)
+        after = t - ramp
+        steady = acceleration * (ramp**2 / 6.0 + after * (ramp + after) / 2.0)
+        rest = np.maximum(rise - t, 0.0)
+        falling = rate * (t - 0.5 * rise) + acceleration * rest**3 / (6.0 * ramp)
+        return np.where(t < ramp, rising, np.where(rest > ramp, steady, falling))
+
+
 def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
     """Returns what a plan may use of the joints' limits.
 
@@ -83,7 +142,7 @@ def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
     )
 
 
-def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointBlend:
+def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTravel:
     """Makes the fastest straight move from rest to rest.
 
     Args:
@@ -91,19 +150,23 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointBlen
         q1: (5,) rad.
         limits: Of the joints, as far as the plan may use them.
     """
-    start, end = MovingState.at_rest(q0), MovingState.at_rest(q1)
-    second = np.ones(1)
-    first, _ = plateaus(start, end, second)
-    _, rate = evaluate(start, end, second, np.array([0.5]))  # Fastest half way.
-    by_velocity = np.abs(rate[0, 0]) / (SEARCH_SHARE * limits.v_max)
-    by_acceleration = np.sqrt(np.abs(first[0]) / (SEARCH_SHARE * limits.a_max))
-    duration = max(_SHORTEST_MOVE, float(np.max([by_velocity, by_acceleration])))
+    travel = np.abs(q1 - q0)
+    # Of the whole way, by the joint that allows least: 1/s and 1/s².
+    with np.errstate(divide="ignore"):
+        rate = SEARCH_SHARE * float(np.min(limits.v_max / travel))
+        acceleration = SEARCH_SHARE * float(np.min(limits.a_max / travel))
+    rate = min(
+        rate, math.sqrt((1.0 - _TRAVEL_RAMP) * acceleration), 2.0 / _SHORTEST_MOVE
+    )
+    speed_up = max(rate / ((1.0 - _TRAVEL_RAMP) * acceleration), 0.5 * _SHORTEST_MOVE)
+    cruise = 1.0 / rate - speed_up
+    move = JointTravel(q0, q1, speed_up, cruise if cruise > _SHORTEST_CRUISE else 0.0)
     # What gravity alone takes cannot be saved by going slower.
     for _ in range(_SLOWER_STEPS):
-        if keeps_limits(JointBlend(start, end, duration).q, duration, limits):
+        if keeps_limits(move.q, move.duration, limits):
             break
-        duration *= _SLOWER
-    return JointBlend(start, end, duration)
+        move = JointTravel(q0, q1, _SLOWER * move.speed_up, _SLOWER * move.cruise)
+    return move
 
 
 def fastest_joint_blend(

@@ -44,6 +44,16 @@ def test_rest_to_rest_uses_one_limit_and_keeps_all(travel):
     np.testing.assert_allclose(move.q(np.array([0.0, move.duration])), [Q0, q1])
 
 
+def test_a_long_way_is_gone_at_the_fastest_rate():
+    """Speeding up takes V / 0.8 A, a fifth of it for ramps; the rest is L / V."""
+    move = rest_to_rest(Q0, Q0 + np.array([2.5, 0.0, 0.0, 0.0, 0.0]), LIMITS)
+    fastest, hardest = 0.98 * 2.0, 0.98 * 5.0
+    expected = 2.5 / fastest + fastest / (0.8 * hardest)
+    assert move.duration == pytest.approx(expected, rel=1e-9)
+    half_way = move.q(np.array([0.5 * move.duration]))
+    np.testing.assert_allclose(half_way[0, 0], Q0[0] + 1.25)
+
+
 def test_rest_to_rest_of_no_length_still_takes_time():
     assert rest_to_rest(Q0, Q0, LIMITS).duration > 0.0
 
