@@ -14,7 +14,7 @@ from painter.errors import InputError
 from painter.planning.remainder import Remainder
 from painter.planning.tile import cell_centres, grid_points
 from painter.planning.zones import inside
-from painter.run.film_on_tile import film_and_truth, film_at
+from painter.run.film_on_tile import film_and_truth, film_around
 from painter.run.folder import SCENARIO, RunFolder
 from painter.run.unfinished import rest_of_run, wall_of_run
 from painter.systems.paint_film import FilmState
@@ -68,7 +68,7 @@ class EarlierRun:
         """
         run, job = RunFolder.open(path), _job(path, overrides)
         wall, film = wall_of_run(run), _film(run, job, cleared)
-        seen = film_at(film.thickness, *film_and_truth(run), wall)
+        seen = film_around(run, wall, film.thickness)
         strokes = MakeProgramPlanner(job).touch_up_strokes(wall, seen)
         if not strokes:
             raise InputError(f"{path}: the film is thin nowhere; nothing to mend.")

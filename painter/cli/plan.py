@@ -19,12 +19,13 @@ from painter.cli.common import (
 from painter.config import load_scenario
 from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.errors import InputError
+from painter.planning.film_model import margin_cells
 from painter.planning.preview import preview_film
 from painter.planning.program import strokes_from
 from painter.planning.store import program_summary, save_program
 from painter.planning.tile import nominal_tile_pose
 from painter.planning.zones import marked_cells
-from painter.run.film_on_tile import film_on_tile
+from painter.run.film_on_tile import film_around
 from painter.run.film_preview import preview_picture
 from painter.run.folder import RunFolder
 from painter.run.pictures import stroke_picture
@@ -135,11 +136,11 @@ def plan(
 def _film_to_mend(
     wall: WallSegmentation, touch_up: Path | None, mark: str | None, nominal: float
 ) -> FloatArray | None:
-    """Returns the film (ny, nx), m, on the wall's grid; None = paint it all."""
-    shape, cell = wall.wall_mask.shape, wall.cell
+    """Returns the film on the tile and its margin, m; None = paint it all."""
     if touch_up is not None:
-        return film_on_tile(RunFolder(touch_up), wall)
+        return film_around(RunFolder(touch_up), wall)
     if mark is None:
         return None
-    marked = marked_cells(mark_corners("--mark", mark), shape, cell)
-    return np.where(marked, 0.0, nominal)
+    corners = mark_corners("--mark", mark)
+    marked = marked_cells(corners, wall.wall_mask.shape, wall.cell)
+    return np.pad(np.where(marked, 0.0, nominal), margin_cells(wall.cell), mode="edge")

@@ -17,7 +17,8 @@ from painter.planning.film_fit import FilmFit, Span
 from painter.planning.film_model import FilmModel, Site
 from perception.values import BoolArray, FloatArray, IntArray
 
-_SPACING = 0.02  # m, between candidate lines.
+_SPACING = 0.02  # m, between candidate lines ...
+_SPACING_IN_SPOTS = 0.01  # ... and where only some spots are looked at.
 _ROUNDS = 10
 # Flow of candidates, as share of what keeps the film's thickness at their stand-off.
 _FLOWS = np.array([0.0, 0.6, 0.75, 0.9, 1.05, 1.25])
@@ -29,7 +30,12 @@ _NEVER = 1e3  # m², cost of what cannot be.
 
 
 def find_cut_ins(
-    fit: FilmFit, model: FilmModel, *, tip: TipConfig, raster: RasterConfig
+    fit: FilmFit,
+    model: FilmModel,
+    *,
+    tip: TipConfig,
+    raster: RasterConfig,
+    where: BoolArray | None = None,
 ) -> None:
     """Adds strokes where the film of those that are there is thin.
 
@@ -39,16 +45,21 @@ def find_cut_ins(
         tip: The spray tip.
         raster: `cut_in_standoff` is the nearest to the wall; where things stand out,
             half way to `standoff` is tried as well.
+        where: (ny, nx) of the site, cells for whose sake strokes are added, from
+            `standoff` too where many of them lie together; None = those beside edges.
     """
     site = model.site
     near = raster.cut_in_standoff
     standoffs = [near]
     if (site.height > 0.2 * near).any():
         standoffs.append(0.5 * (near + raster.standoff))
+    if where is not None:
+        standoffs.append(raster.standoff)
+    spacing = _SPACING if where is None else _SPACING_IN_SPOTS
     width = (site.wanted.shape[1] - 2 * site.border) * site.cell
-    places = np.linspace(0.0, width, round(width / _SPACING) + 1)[1:-1]
+    places = np.linspace(0.0, width, round(width / spacing) + 1)[1:-1]
     fan = round(2.0 * half_axes(tip, raster.standoff)[0] / site.cell)
-    beside = _worth_a_stroke(site, fan)
+    beside = _worth_a_stroke(site, fan) if where is None else where
     for _ in range(_ROUNDS):
         found: list[tuple[float, float, list[Span]]] = []
         for standoff in standoffs:

@@ -40,7 +40,12 @@ class FilmFit:
     """Spans on a site and the film they leave; spans are added, then fitted."""
 
     def __init__(
-        self, model: FilmModel, cost: FilmCost, *, raster: RasterConfig
+        self,
+        model: FilmModel,
+        cost: FilmCost,
+        *,
+        raster: RasterConfig,
+        film: FloatArray | None = None,
     ) -> None:
         """Begins with none.
 
@@ -48,10 +53,13 @@ class FilmFit:
             model: Film on the site.
             cost: Of the film.
             raster: Gives stand-offs and the shortest stroke.
+            film: (ny, nx) of the site, what is there already; None = nothing.
         """
         site = model.site
         self.spans: list[Span] = []
         self.film: FloatArray = np.zeros(site.wanted.shape)
+        if film is not None:
+            self.film += film
         self._model, self._cost, self._raster = model, cost, raster
         size = 2 * round(_GUN_REACH / site.cell) + 1
         self._tops = maximum_filter(site.height, size=size) + _GUN_FRONT
@@ -143,9 +151,8 @@ class FilmFit:
             line = self._model.line(span.x, span.standoff)
             ends = (trial.low, span.low) if trial.low != span.low else ()
             ends = ends or (trial.high, span.high)
-            blur = float(line.thickness.max())
-            first = max(first, self._row(min(ends) - blur))
-            end = min(end, self._row(max(ends) + blur) + 1)
+            first = max(first, self._row(min(ends) - line.blur))
+            end = min(end, self._row(max(ends) + line.blur) + 1)
         rows = slice(first, end)
         (_, left, without), (_, right, with_) = (
             self._patch(span, rows),
@@ -194,7 +201,7 @@ class FilmFit:
         return int(min(max(row, 0), site.wanted.shape[0]))
 
     def _rows(self, span: Span) -> slice:
-        blur = float(self._model.line(span.x, span.standoff).thickness.max())
+        blur = self._model.line(span.x, span.standoff).blur
         return slice(self._row(span.low - blur), self._row(span.high + blur) + 1)
 
     def _patch(

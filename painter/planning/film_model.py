@@ -6,6 +6,7 @@ form, and across it the fan's thickness blurs the stroke's ends. Film is given a
 share of the nominal film.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -67,14 +68,14 @@ class Site(FrozenValue):
             border=border,
         )
 
-    @property
+    @functools.cached_property
     def x(self) -> FloatArray:
         """(nx,) m, centres of the columns in T."""
         return np.asarray(
             (np.arange(self.wanted.shape[1]) - self.border + 0.5) * self.cell
         )
 
-    @property
+    @functools.cached_property
     def y(self) -> FloatArray:
         """(ny,) m, centres of the rows in T."""
         return np.asarray(
@@ -95,6 +96,11 @@ class Line(FrozenValue):
     columns: tuple[int, int]
     film: FloatArray
     thickness: FloatArray
+
+    @functools.cached_property
+    def blur(self) -> float:
+        """How far from a stroke's end its film is not yet or still whole, m."""
+        return float(self.thickness.max())
 
 
 class FilmModel:
@@ -162,8 +168,11 @@ class FilmModel:
         reach = int(np.ceil(spread * a / cell)) + 1
         count = site.wanted.shape[1]
         first, end = max(middle - reach, 0), min(middle + reach + 1, count)
-        rows, back = np.unique(site.height[:, first:end], axis=0, return_inverse=True)
-        drop = np.maximum(standoff - rows, 1e-6)
+        # Rows that are as the one below them are looked at once.
+        height = site.height[:, first:end]
+        new = np.append(True, (height[1:] != height[:-1]).any(axis=1))
+        back = np.cumsum(new) - 1
+        drop = np.maximum(standoff - height[new], 1e-6)
         edges = (np.arange(first, end + 1) - site.border) * cell - x_line
         # The steepest ray that has landed by each column's far edge, on either side;
         # a column higher than the nozzle stops them all.
@@ -177,7 +186,7 @@ class FilmModel:
         share[:, : split + 1] += left[:, ::-1]
         centres = site.x[first:end] - x_line
         thin = b * np.sqrt(np.clip(1.0 - (centres / a) ** 2, 1e-4, None))
-        film = share[back.ravel()] * (self._dose / cell)
+        film = share[back] * (self._dose / cell)
         return Line((first, end), film, thin)
 
     def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:

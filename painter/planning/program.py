@@ -10,6 +10,7 @@ from painter.errors import CollisionError, InputError, ReachError
 from painter.planning.blend import MovingState
 from painter.planning.clear_strokes import clear_strokes, nozzle_points
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
+from painter.planning.film_model import Site
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
 from painter.planning.joint_motion import Segment, chain, planning_limits, start_times
 from painter.planning.kinematics import ArmKinematics, ArmLimits
@@ -66,15 +67,20 @@ class ProgramPlanner(FrozenValue):
     def touch_up_strokes(
         self, segmentation: WallSegmentation, film: FloatArray
     ) -> tuple[Stroke, ...]:
-        """Returns the strokes that mend a film (ny, nx), m, where it is thin."""
-        raster, cell = self.raster, segmentation.cell
+        """Returns the strokes that mend a film where it is thin.
+
+        Args:
+            segmentation: Of the tile.
+            film: m, on the tile and `margin_cells` around it.
+        """
+        mask, cell = np.asarray(segmentation.wall_mask), segmentation.cell
+        wanted = in_zones(mask, cell, self.raster.zones)
         return touch_up_strokes(
             film,
-            in_zones(np.asarray(segmentation.wall_mask), cell, raster.zones),
-            cell,
+            Site.of_tile(wanted, cell, np.asarray(segmentation.depth, np.float64)),
             nominal=self.nominal_film(segmentation),
             tip=self.tip,
-            raster=raster,
+            raster=self.raster,
         )
 
     def nominal_film(self, segmentation: WallSegmentation) -> float:

@@ -6,6 +6,8 @@ over the tile. Where a line would soil what stays clean it is left out; `find_cu
 fills in with narrower strokes from nearer to the wall, and `FilmFit` fits them all.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
@@ -79,7 +81,7 @@ def plan_strokes(
     if raster.cut_in_standoff < raster.standoff:
         find_cut_ins(fit, model, tip=tip, raster=raster)
     fit.fit()
-    return _strokes(fit.spans, tip=tip, raster=raster)
+    return fitted_strokes(fit.spans, tip=tip, raster=raster)
 
 
 def raster_film(width: float, *, tip: TipConfig, raster: RasterConfig) -> float:
@@ -113,8 +115,8 @@ def _body_spans(
     return spans
 
 
-def _strokes(
-    spans: list[Span], *, tip: TipConfig, raster: RasterConfig
+def fitted_strokes(
+    spans: Sequence[Span], *, tip: TipConfig, raster: RasterConfig
 ) -> tuple[Stroke, ...]:
     """Returns fitted spans as strokes, upwards; the valve's shortest gap is kept."""
     gap = max(raster.min_stroke, 2.0 * tip.valve_delay * raster.speed)

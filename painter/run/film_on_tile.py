@@ -4,27 +4,39 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from painter.errors import InputError
+from painter.planning.film_model import margin_cells
 from painter.planning.tile import cell_centres, grid_points
 from painter.run.folder import FILM, TRUTH, RunFolder
 from painter.run.values import Film, Truth
 from perception.values import FloatArray, WallSegmentation
 
 
-def film_on_tile(run: RunFolder, wall: WallSegmentation) -> FloatArray:
-    """Returns the film that a run left, as the robot's tile grid sees it.
+def film_around(
+    run: RunFolder, wall: WallSegmentation, thickness: FloatArray | None = None
+) -> FloatArray:
+    """Returns a film as the robot's tile grid and the margin around it see it.
 
     Args:
         run: Folder of a run with film and truth.
         wall: Segmentation whose tile frame and grid are wanted.
+        thickness: (ny, nx) m, on the grid of the run's film; None = that film.
 
     Returns:
-        (ny, nx) m, row 0 at the bottom.
+        m, on the tile and `margin_cells` around it, row 0 at the bottom.
 
     Raises:
         InputError: The run has no film, or nothing that tells where its grid lies.
     """
     film, truth = film_and_truth(run)
-    return film_at(film.thickness, film, truth, wall)
+    border = margin_cells(wall.cell)
+    ny, nx = (size + 2 * border for size in wall.wall_mask.shape)
+    x, y = cell_centres((ny, nx), wall.cell, margin=border * wall.cell)
+    p_SQs = truth.X_WS.inverse() @ wall.X_WT @ grid_points(x, y)
+    column = (p_SQs[0] - film.x0) / film.cell - 0.5
+    row = (p_SQs[1] - film.y0) / film.cell - 0.5
+    laid = film.thickness if thickness is None else thickness
+    found = map_coordinates(laid, [row, column], order=1, mode="nearest")
+    return np.asarray(found, dtype=np.float64).reshape(ny, nx)
 
 
 def film_and_truth(run: RunFolder) -> tuple[Film, Truth]:
@@ -35,29 +47,3 @@ def film_and_truth(run: RunFolder) -> tuple[Film, Truth]:
     if truth is None:
         raise InputError(f"{run.path / TRUTH}: no such file.")
     return film, truth
-
-
-def film_at(
-    thickness: FloatArray,
-    film: Film,
-    truth: Truth,
-    wall: WallSegmentation,
-    *,
-    border: int = 0,
-) -> FloatArray:
-    """Returns a film, m, on a tile's grid and `border` cells around it.
-
-    Args:
-        thickness: (ny, nx) m, on the film's grid.
-        film: Gives that grid.
-        truth: Tells where it lies.
-        wall: Segmentation whose tile frame and grid are wanted.
-        border: Cells on each side.
-    """
-    ny, nx = (size + 2 * border for size in wall.wall_mask.shape)
-    x, y = cell_centres((ny, nx), wall.cell, margin=border * wall.cell)
-    p_SQs = truth.X_WS.inverse() @ wall.X_WT @ grid_points(x, y)
-    column = (p_SQs[0] - film.x0) / film.cell - 0.5
-    row = (p_SQs[1] - film.y0) / film.cell - 0.5
-    found = map_coordinates(thickness, [row, column], order=1, mode="nearest")
-    return np.asarray(found, dtype=np.float64).reshape(ny, nx)

@@ -6,12 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from painter.planning.config import TipConfig
-from painter.planning.film_model import margin_cells
 from painter.planning.preview import FilmPreview, preview_film
 from painter.planning.spray_path import PaintProgram
 from painter.planning.tile import grid_points
 from painter.run import style
-from painter.run.film_on_tile import film_at
+from painter.run.film_on_tile import film_around
 from painter.run.folder import RunFolder
 from painter.run.values import Film
 from perception.values import WallSegmentation
@@ -35,10 +34,9 @@ def run_preview(
     segmentation = folder.segmentation()
     if segmentation is None:
         return None
-    film, truth, before = folder.film(), folder.truth(), None
-    if film is not None and film.before is not None and truth is not None:
-        border = margin_cells(segmentation.cell)
-        before = film_at(film.before, film, truth, segmentation, border=border)
+    film, before = folder.film(), None
+    if film is not None and film.before is not None:
+        before = film_around(folder, segmentation, film.before)
     return preview_film(
         program.strokes,
         segmentation,

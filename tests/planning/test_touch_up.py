@@ -5,6 +5,7 @@ import pytest
 
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.deposition import best_pitch, mean_film, predicted_film
+from painter.planning.film_model import Site
 from painter.planning.program import strokes_from
 from painter.planning.spray_path import Stroke
 from painter.planning.tile import cell_centres
@@ -28,10 +29,11 @@ def even_film():
     return predicted_film(strokes, *cell_centres(SHAPE, CELL), tip=TIP)
 
 
-def mend(film, wanted=WALL):
-    strokes = touch_up_strokes(
-        film, wanted, CELL, nominal=NOMINAL, tip=TIP, raster=RASTER
-    )
+def mend(film, wanted=WALL, height=None):
+    """Strokes, and the film on the tile once they are sprayed, by the closed form."""
+    site = Site.of_tile(wanted, CELL, height)
+    around = np.pad(film, site.border, mode="edge")
+    strokes = touch_up_strokes(around, site, nominal=NOMINAL, tip=TIP, raster=RASTER)
     return strokes, film + predicted_film(
         sorted(strokes, key=lambda s: s.start_T[0]),
         *cell_centres(SHAPE, CELL),
@@ -53,8 +55,9 @@ def test_cleared_patch_is_mended_without_doubling_film_elsewhere(corner):
     assert strokes
     assert np.mean(mended[patch] >= 0.8 * NOMINAL) >= 0.95
     assert np.mean(mended >= 1.5 * NOMINAL) <= 0.01
+    # Strokes stay within the fan's reach of the patch.
     away = np.ones(SHAPE, dtype=bool)
-    away[row - 6 : row + 26, column - 6 : column + 26] = False
+    away[row - 6 : row + 26, column - 8 : column + 28] = False
     np.testing.assert_array_equal(mended[away], film[away])
 
 
@@ -69,7 +72,9 @@ def test_large_gap_is_filled_with_the_wide_fan():
     film = even_film()
     film[:, :120] = 0.0
     strokes, mended = mend(film)
-    assert {stroke.standoff for stroke in strokes} == {RASTER.standoff}
+    wide = [stroke for stroke in strokes if stroke.standoff == RASTER.standoff]
+    # Near strokes fill only what is left between those of the wide fan.
+    assert sum(s.length for s in wide) > 0.6 * sum(s.length for s in strokes)
     assert np.mean(mended[:, 12:110] >= 0.8 * NOMINAL) > 0.97
 
 
@@ -80,6 +85,24 @@ def test_what_stays_clean_and_soft_edges_are_no_reason_to_spray():
     film[60:120, 60:120] = 0.0  # A window.
     film[50:150, 58:60] *= 0.6  # Beside it, a strip of 2 cm.
     assert mend(film, wanted)[0] == ()
+
+
+def test_spot_beside_a_box_is_mended_from_where_the_gun_clears_it():
+    film, wanted, height = even_film(), WALL.copy(), np.zeros(SHAPE)
+    box = (slice(90, 110), slice(110, 120))
+    wanted[box], height[box] = False, 0.08
+    film[PATCH] = 0.0
+    strokes, _ = mend(film, wanted, height)
+    beside = [stroke for stroke in strokes if stroke.start_T[0] > 1.04]
+    assert beside
+    # The gun's front keeps 5 cm over the box where its half width reaches it.
+    assert min(stroke.standoff for stroke in beside) >= 0.13
+
+
+def test_film_on_another_grid_is_refused():
+    site = Site.of_tile(WALL, CELL)
+    with pytest.raises(ValueError, match=r"film is \(200, 200\) cells"):
+        touch_up_strokes(even_film(), site, nominal=NOMINAL, tip=TIP, raster=RASTER)
 
 
 def test_mark_is_a_rectangle_or_a_polygon():

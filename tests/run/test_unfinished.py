@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from painter.errors import InputError
-from painter.run.film_on_tile import film_at, film_on_tile
+from painter.planning.film_model import margin_cells
+from painter.run.film_on_tile import film_around
 from painter.run.film_preview import run_preview
 from painter.run.unfinished import rest_of_run
 
@@ -37,17 +38,16 @@ def test_a_run_of_which_nothing_is_left_is_refused(full_folder, stop, text):
 
 def test_a_run_without_film_names_the_file(started_folder, segmentation):
     with pytest.raises(InputError, match=r"film\.npz: no such file"):
-        film_on_tile(started_folder, segmentation)
+        film_around(started_folder, segmentation)
 
 
-def test_film_is_seen_where_it_lies(film, truth, segmentation):
+def test_film_is_seen_where_it_lies(full_folder, film, segmentation):
     # S is T here; the film's grid begins 0.1 m before the tile's.
     thickness = np.zeros(film.thickness.shape)
     thickness[10 + 30, 10 + 50] = 1.0
-    on_tile = film_at(thickness, film, truth, segmentation)
-    assert np.argwhere(on_tile > 0.5).tolist() == [[30, 50]]
-    bordered = film_at(thickness, film, truth, segmentation, border=5)
-    assert np.argwhere(bordered > 0.5).tolist() == [[35, 55]]
+    dut = film_around(full_folder, segmentation, thickness)
+    border = margin_cells(0.01)
+    assert np.argwhere(dut > 0.5).tolist() == [[border + 30, border + 50]]
 
 
 def test_preview_of_a_run_gone_on_with_counts_what_was_there(
