@@ -1,10 +1,11 @@
 """Step 3 of the segmentation: labels and depths of points on a grid over the tile."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from perception.values import BoolArray, FloatArray, FrozenValue, IntArray
+from perception.values import FloatArray, FrozenValue, IntArray
 
 NOTHING = -1  # Label of a cell without a point; 0 is a point of no plane.
 # Depths are summed in these steps, m: 2^53 of them, as many as a float counts exactly,
@@ -28,7 +29,13 @@ class LabelGrid(FrozenValue):
 
 
 def label_grid(
-    p_TQs: FloatArray, labels: IntArray, *, width: float, height: float, cell: float
+    p_TQs: FloatArray,
+    labels: IntArray,
+    *,
+    width: float,
+    height: float,
+    cell: float,
+    hidden: float = math.inf,
 ) -> LabelGrid:
     """Gives each cell the label and depth of its point closest to the mean depth.
 
@@ -50,7 +57,13 @@ def label_grid(
     meets it first), then the one of the smaller label; so the grid does not depend on
     the points' order.
 
-    Source: Tadic et al., "Painting Robot with RealSense D435", 2021, equations 4 and 5.
+    Through a window the camera sees, at a slant, things behind the wall beside the
+    window. Straight on they would share cells with the wall and pull the mean depth
+    there to between the two. The gun, square to the wall, meets the foremost surface:
+    points far behind that can be left out.
+
+    Source: Tadic et al., "Painting Robot with RealSense D435", 2021, equations 4 and 5;
+    the paper keeps all points.
 
     Args:
         p_TQs: (3, N) finite, m, in T; points beside the tile are left out.
@@ -58,66 +71,41 @@ def label_grid(
         width: Of the tile, m, along T x.
         height: Of the tile, m, along T y.
         cell: Edge of a cell, m.
+        hidden: Points deeper than the foremost of their cell by more are left out, m.
 
     Returns:
         The grid, (round(height / cell), round(width / cell)).
+
+    Raises:
+        ValueError: The tile is smaller than a cell.
     """
-    cells, shape = _cells_of(p_TQs, width=width, height=height, cell=cell)
-    index = np.flatnonzero(cells >= 0)
-    own, z, tags = cells[index], p_TQs[2, index], labels[index]
-    size = shape[0] * shape[1]
+    nx, ny = round(width / cell), round(height / cell)
+    if nx < 1 or ny < 1:
+        raise ValueError(f"a tile of {width} x {height} m has no cell of {cell} m.")
+    size = nx * ny
+    # Axis by axis, whatever the caller's order.
+    columns, rows = np.ascontiguousarray(p_TQs[:2]) / cell
+    inside = (columns >= 0.0) & (columns < nx) & (rows >= 0.0) & (rows < ny)
+    columns, rows, z, tags = (
+        values.compress(inside) for values in (columns, rows, p_TQs[2], labels)
+    )
+    own = rows.astype(np.int64) * nx + columns.astype(np.int64)
+    front = np.full(size, -np.inf)
+    np.maximum.at(front, own, z)
+    visible = z >= front.take(own) - hidden
+    own, z, tags = (values.compress(visible) for values in (own, z, tags))
     grid_labels = np.full(size, NOTHING, dtype=np.int64)
     grid_depth = np.full(size, np.nan)
     # Sums of whole quanta are exact, so the means are the same for any input order.
     sums = np.bincount(own, weights=np.rint(z / _QUANTUM), minlength=size)
     means = sums / np.maximum(1, np.bincount(own, minlength=size)) * _QUANTUM
-    off = np.abs(z - means[own])
+    off = np.abs(z - means.take(own))
     least = np.full(size, np.inf)
     np.minimum.at(least, own, off)
-    closest = np.flatnonzero(off == least[own])
+    closest = np.flatnonzero(off == least.take(own))
     # Few are equally close: the last that is written to a cell stays.
     order = closest[np.lexsort((-tags[closest], z[closest]))]
     grid_labels[own[order]] = tags[order]
     grid_depth[own[order]] = z[order]
+    shape = (ny, nx)
     return LabelGrid(grid_labels.reshape(shape), grid_depth.reshape(shape), cell)
-
-
-def visible_points(
-    p_TQs: FloatArray, *, width: float, height: float, cell: float, tolerance: float
-) -> BoolArray:
-    """Finds the points that nothing stands in front of, as the gun sees them.
-
-    Through a window the camera sees, at a slant, things behind the wall beside the
-    window. Straight on they would share cells with the wall and pull the mean depth
-    there to between the two. The gun, square to the wall, meets the foremost surface:
-    points deeper than that by more than `tolerance` are hidden.
-
-    Args:
-        p_TQs: (3, N) finite, m, in T.
-        width: Of the tile, m.
-        height: Of the tile, m.
-        cell: Edge of a cell, m.
-        tolerance: What still counts as the same surface, m.
-
-    Returns:
-        (N,) True = visible; points beside the tile are.
-    """
-    cells, shape = _cells_of(p_TQs, width=width, height=height, cell=cell)
-    inside = cells >= 0
-    front = np.full(shape[0] * shape[1], -np.inf)
-    np.maximum.at(front, cells[inside], p_TQs[2, inside])
-    visible = np.ones(cells.size, dtype=np.bool_)
-    visible[inside] = p_TQs[2, inside] >= front[cells[inside]] - tolerance
-    return visible
-
-
-def _cells_of(
-    p_TQs: FloatArray, *, width: float, height: float, cell: float
-) -> tuple[IntArray, tuple[int, int]]:
-    """Numbers each point's cell row by row, -1 beside the tile; and (ny, nx)."""
-    nx, ny = round(width / cell), round(height / cell)
-    if nx < 1 or ny < 1:
-        raise ValueError(f"a tile of {width} x {height} m has no cell of {cell} m.")
-    columns, rows = np.floor(p_TQs[:2] / cell).astype(np.int64)
-    inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
-    return np.where(inside, rows * nx + columns, -1), (ny, nx)

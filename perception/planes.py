@@ -116,7 +116,7 @@ def ransac_plane(
     plane = _refit(sample, inliers, threshold)
     inliers = np.abs(plane.distances(p_WQs)) <= threshold
     if np.count_nonzero(inliers) >= 3:
-        plane = fit_plane(p_WQs[:, inliers])
+        plane = fit_plane(p_WQs.compress(inliers, axis=1))
     return plane, np.abs(plane.distances(p_WQs)) <= threshold
 
 
@@ -144,7 +144,8 @@ def segment_planes(
         for a point of none; and the planes.
     """
     labels = np.zeros(p_WQs.shape[1], dtype=np.int64)
-    rest, points = np.arange(labels.size), p_WQs
+    # Axis by axis, whatever the caller's order; `compress` keeps it so.
+    rest, points = np.arange(labels.size), np.ascontiguousarray(p_WQs)
     planes: list[Plane] = []
     while len(planes) < max_planes and rest.size >= stop_fraction * labels.size:
         found = ransac_plane(points, threshold=threshold, rng=rng)
@@ -153,7 +154,7 @@ def segment_planes(
         plane, inliers = found
         planes.append(plane)
         labels[rest[inliers]] = len(planes)
-        rest, points = rest[~inliers], points[:, ~inliers]
+        rest, points = rest[~inliers], points.compress(~inliers, axis=1)
     return labels, tuple(planes)
 
 
@@ -191,7 +192,7 @@ def _scores(
 def _refit(points: FloatArray, inliers: BoolArray, threshold: float) -> Plane:
     """Fits to the inliers and selects them anew until they stay the same."""
     for _ in range(_MAX_REFITS):
-        plane = fit_plane(points[:, inliers])
+        plane = fit_plane(points.compress(inliers, axis=1))
         again = np.abs(plane.distances(points)) <= threshold
         if np.array_equal(again, inliers) or np.count_nonzero(again) < 3:
             break

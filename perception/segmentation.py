@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from perception.config import SegmentationConfig
 from perception.errors import NoWallError
 from perception.filters import statistical_filter
-from perception.label_grid import NOTHING, LabelGrid, label_grid, visible_points
+from perception.label_grid import NOTHING, LabelGrid, label_grid
 from perception.planes import Plane, segment_planes
 from perception.refine import refine_segmentation
 from perception.regions import (
@@ -134,7 +134,7 @@ def segment_wall(
     used = np.flatnonzero(np.all(np.isfinite(p_WQs), axis=0))[found.kept]
     return refine_segmentation(
         coarse,
-        wall.X_WT.inverse() @ found.p_WQs[:, found.kept],
+        wall.X_WT.inverse() @ found.p_WQs.compress(found.kept, axis=1),
         counts=None if counts is None else counts[used],
         variances=None if variances is None else variances[used],
         config=config,
@@ -159,7 +159,7 @@ def find_planes(
         NoWallError: There are too few points.
     """
     config.validate()
-    p_WQs = p_WQs[:, finite_points(p_WQs)]
+    p_WQs = p_WQs.compress(finite_points(p_WQs), axis=1)
     kept = statistical_filter(
         p_WQs,
         neighbors=config.neighbors,
@@ -168,7 +168,7 @@ def find_planes(
     )
     labels = np.zeros(kept.size, dtype=np.int64)
     labels[kept], planes = segment_planes(
-        p_WQs[:, kept],
+        p_WQs.compress(kept, axis=1),
         threshold=config.distance_threshold,
         stop_fraction=config.stop_fraction,
         max_planes=config.max_planes,
@@ -206,10 +206,12 @@ def segment_tile(
         NoWallError: No region of the wall's plane is on the tile.
     """
     size = {"width": width, "height": height, "cell": config.cell}
-    p_TQs = wall.X_WT.inverse() @ found.p_WQs[:, found.kept]
-    labels = found.labels[found.kept]
-    visible = visible_points(p_TQs, **size, tolerance=config.cluster_tolerance)
-    grid = label_grid(p_TQs[:, visible], labels[visible], **size)
+    grid = label_grid(
+        wall.X_WT.inverse() @ found.p_WQs.compress(found.kept, axis=1),
+        found.labels.compress(found.kept),
+        **size,
+        hidden=config.cluster_tolerance,
+    )
     clusters = euclidean_clusters(grid, tolerance=config.cluster_tolerance)
     parts = adjacent_regions(clusters)
     area = {"min_area": config.min_region_area, "cell": config.cell}

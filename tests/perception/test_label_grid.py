@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from perception.label_grid import NOTHING, label_grid, visible_points
+from perception.label_grid import NOTHING, label_grid
 
 
 def one_cell(z, labels):
@@ -66,9 +66,15 @@ def test_tile_smaller_than_a_cell_is_refused():
 
 
 def test_points_behind_a_surface_are_hidden():
-    # Cell 0: wall at 0, something 1 m behind; cell 1: the same depth in the open.
-    x = [0.005, 0.005, 0.005, 0.015, -0.5]
-    z = [0.0, -0.07, -1.0, -1.0, -1.0]
-    points = np.array([x, [0.005] * 5, z])
-    visible = visible_points(points, width=0.02, height=0.01, cell=0.01, tolerance=0.08)
-    np.testing.assert_array_equal(visible, [True, True, False, True, True])
+    # Cell 0: wall at 0 and 0.07 m behind it, something 1 m behind; cell 1: in the open.
+    x = [0.005, 0.005, 0.005, 0.005, 0.015]
+    z = [0.0, 0.0, -0.07, -1.0, -1.0]
+    points, labels = np.array([x, [0.005] * 5, z]), np.array([1, 1, 2, 3, 3])
+    size = {"width": 0.02, "height": 0.01, "cell": 0.01}
+    grid = label_grid(points, labels, **size, hidden=0.08)
+    np.testing.assert_array_equal(grid.labels, [[1, 3]])
+    # With all points cell 0 has mean -0.2675, to which -0.07 is the closest.
+    np.testing.assert_array_equal(label_grid(points, labels, **size).labels, [[2, 3]])
+    # What is as deep as the bound is visible, and here closest to the mean.
+    grid = label_grid(points[:, [0, 2, 2]], labels[[0, 2, 2]], **size, hidden=0.07)
+    np.testing.assert_array_equal(grid.labels, [[2, NOTHING]])
