@@ -35,7 +35,8 @@ def film_around(
     column = (p_SQs[0] - film.x0) / film.cell - 0.5
     row = (p_SQs[1] - film.y0) / film.cell - 0.5
     laid = film.thickness if thickness is None else thickness
-    found = map_coordinates(laid, [row, column], order=1, mode="nearest")
+    # The nearest cell: a mean of two would hide where film ends.
+    found = map_coordinates(laid, [row, column], order=0, mode="nearest")
     return np.asarray(found, dtype=np.float64).reshape(ny, nx)
 
 
