@@ -29,6 +29,8 @@ _ANCHORS = (
     (-0.30, 0.30),
 )
 _DRAWN_BACK = (0.3, 0.2, 0.1)  # m from where the gun is, tried in turn.
+_DRAWN_OVER = (0.05, 0.10, 0.20)  # m, on the way from one rest to another.
+_SQUARE = 1e-6  # rad, at most, by which the gun is off where it counts as square.
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +134,8 @@ class Linker(FrozenValue):
                 known.setdefault(key, rest_to_rest(a, b, self.limits))
                 legs.append(known[key])
             plans.append(legs)
+        if not self.clear(plans[0][0]):
+            plans += [[move] for move in self._drawn_over(q0, q1)]
         clear: dict[int, bool] = {}
         for legs in sorted(plans, key=lambda legs: sum(leg.duration for leg in legs)):
             for leg in legs:
@@ -153,6 +157,16 @@ class Linker(FrozenValue):
         """Raises CollisionError if a segment, called `what`, does not keep clear."""
         time = sample_times(segment)
         self.space.require(segment.q(time), time, what=what)
+
+    def _drawn_over(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
+        """Returns moves of the square gun from rest to rest over a hop."""
+        _, p_WGs = self.gun.kinematics.gun_poses(np.stack([q0, q1]))
+        p_TGs = (self.gun.X_WT.inverse() @ p_WGs.T).T
+        if not np.allclose(self.gun.solve(p_TGs), [q0, q1], atol=_SQUARE):
+            return []
+        start, end = (MovingState.at_rest(p_TG) for p_TG in p_TGs)
+        moves = [self._ways(start, end, hop) for hop in _DRAWN_OVER]
+        return [move for ways in moves for move in ways]
 
     def _ways(self, start: MovingState, end: MovingState, hop: float) -> list[Segment]:
         """Returns blends from start to end: of the nozzle, and without hop of joints.

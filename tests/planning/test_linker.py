@@ -6,6 +6,7 @@ import pytest
 from painter.errors import CollisionError
 from painter.planning.blend import MovingState
 from painter.planning.gun_path import ToolMove
+from painter.planning.joint_motion import rest_to_rest
 from painter.planning.linker import end_q, start_q
 from painter.planning.obstacles import ObstacleBox
 
@@ -79,6 +80,20 @@ def test_transit_goes_round_what_blocks_the_straight_way(robot):
     np.testing.assert_allclose(start_q(legs[0]), q0)
     np.testing.assert_allclose(end_q(legs[-1]), q1)
     assert all(linker.clear(leg) for leg in legs)
+
+
+def test_gun_is_drawn_back_a_little_where_the_joints_straight_way_grazes(robot):
+    """Low before the wall the arm swings through a chord's arc, a few mm into it."""
+    linker = robot.linker()
+    ends = np.array([[0.15, -0.10, 0.18], [1.13, -0.10, 0.15]])
+    q0, q1 = linker.gun.solve(ends)
+    assert not linker.clear(rest_to_rest(q0, q1, linker.limits))
+    (move,) = linker.transit(q0, q1)
+    assert linker.clear(move)
+    places = nozzle(linker, move)
+    np.testing.assert_allclose(places[[0, -1]], ends, atol=1e-6)
+    assert 0.2 < places[:, 2].max() < 0.4
+    assert move.duration < 2.5  # Folding and unfolding takes twice as long.
 
 
 def test_no_way_out_of_a_collision(robot):
