@@ -179,6 +179,24 @@ class ArmKinematics(FrozenValue):
         jacobian: FloatArray = np.concatenate([axes, linear], axis=1)
         return jacobian
 
+    def travel(self, q: FloatArray) -> FloatArray:
+        """Bounds how far any point of the arm's axes moves from row to row.
+
+        A turn moves what lies beyond it by no more than its length; links that tilt by
+        as much as others tilt back do not move what lies beyond them.
+
+        Args:
+            q: (n, 5) rad.
+
+        Returns:
+            (n - 1,) m.
+        """
+        tool = float(np.linalg.norm(self.X_LG.translation()))
+        tilts = np.cumsum(q[:, 1:4], axis=1)
+        turns = np.abs(np.diff(np.column_stack([q[:, 0], tilts, q[:, 4]]), axis=0))
+        lengths = [self.upper_arm + self.forearm + tool, self.upper_arm, self.forearm]
+        return np.asarray(turns @ np.array([*lengths, tool, tool]))
+
     def _joint_points(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Shoulder, elbow and wrist centre in W, each (n, 3)."""
         ahead = np.stack([np.cos(q[:, 0]), np.sin(q[:, 0]), np.zeros(len(q))], axis=-1)

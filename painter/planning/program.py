@@ -147,6 +147,7 @@ class ProgramPlanner(FrozenValue):
         )
         verify_motion(
             program.motion,
+            kinematics=self.kinematics,
             limits=limits,
             limit_share=motion.limit_share,
             space=space,

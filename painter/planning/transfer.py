@@ -89,6 +89,7 @@ def plan_transfer(
     planned = chain(path, period=motion.sample_period)
     verify_motion(
         planned,
+        kinematics=kinematics,
         limits=limits,
         limit_share=motion.limit_share,
         space=space,

@@ -142,6 +142,24 @@ def test_a_branch_is_plus_or_minus_one():
         ARM.solve(np.zeros((1, 3)), np.array([1.0, 0.0, 0.0]), elbow=0)
 
 
+def test_travel_bounds_how_far_elbow_wrist_and_nozzle_move():
+    rng = np.random.default_rng(8)
+    start = random_positions(200)
+    q = np.stack([start, start + rng.normal(0.0, 0.05, start.shape)], axis=1)
+    bound = np.array([ARM.travel(pair)[0] for pair in q])
+    for points in (lambda q: ARM.gun_poses(q)[1], lambda q: ARM.forward(q)[1]):
+        moved = np.linalg.norm(points(q[:, 1]) - points(q[:, 0]), axis=1)
+        assert (moved <= bound + 1e-12).all()
+    # One joint alone, stretched out: the arc, a hair longer than its chord.
+    turned = np.array([np.zeros(5), [0.01, 0.0, 0.0, 0.0, 0.0]])
+    assert ARM.travel(turned) == pytest.approx([1.8 * 0.01])
+
+
+def test_shoulder_and_elbow_that_tilt_against_one_another_leave_the_forearm_level():
+    q = np.array([np.zeros(5), [0.0, 0.02, -0.02, 0.0, 0.0]])
+    assert ARM.travel(q) == pytest.approx([0.7 * 0.02])
+
+
 def test_limits_hold_at_the_bounds_and_never_for_nan():
     one = np.ones(5)
     limits = ArmLimits(q_min=-one, q_max=one, v_max=one, a_max=one, effort_max=one)

@@ -137,6 +137,7 @@ def test_verification_finds_a_motion_that_is_too_fast(robot, program):
     with pytest.raises(MotionLimitError, match=r"rush: \w+ of .* allowed is"):
         verify_motion(
             fast,
+            kinematics=robot.kinematics,
             limits=robot.limits,
             limit_share=0.9,
             space=robot.linker().space,

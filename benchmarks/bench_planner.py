@@ -1,0 +1,122 @@
+"""Planning time of a tile by stage, one core, without the first import.
+
+Run `taskset -c 0 python -m benchmarks.bench_planner [SCENE ...]`; a scene is the name
+of a scenario or `random:SEED`. Edges of masks are exact and heights as noisy as a map
+gives them; a cycle's planning is that of the masks that it has sensed. `crowded` has
+ten objects, as the issue's bound on planning has.
+"""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from painter.config import load_scenario
+from painter.diagrams.program_planner import MakeProgramPlanner
+from painter.diagrams.true_wall import true_segmentation
+from painter.planning import program, raster
+from painter.planning.program import ProgramPlanner
+from perception.values import WallSegmentation
+
+SCENES = ("blank", "cubes", "obstacles", "terrace", "room", "random:1", "crowded")
+# What is timed, under the name that the module which calls it knows it by.
+STAGES: dict[str, tuple[Any, str]] = {
+    "lines": (raster, "place_lines"),
+    "cut-ins": (raster, "find_cut_ins"),
+    "fit": (raster.FilmFit, "fit"),
+    "cut back": (program, "clear_strokes"),
+    "order": (program, "order_strokes"),
+    "links": (program, "_link"),
+    "verify": (program, "verify_motion"),
+    "verify strokes": (program, "verify_strokes"),
+}
+REPEATS = 3
+NOISE = 0.002  # m, of mapped heights.
+# x, y, width, height in T and height over the wall, m: five in each of two columns,
+# nowhere in one line, so that each wants cut-ins of its own.
+CROWD = [
+    (x + 0.03 * row, 0.2 + 0.36 * row + dy, 0.14, 0.12, 0.08)
+    for x, dy in ((0.45, 0.0), (1.25, 0.09))
+    for row in range(5)
+]
+
+
+def main() -> None:
+    """Prints a line for each scene: the quickest of some runs, s."""
+    planner = MakeProgramPlanner(load_scenario("blank"))
+    plan(planner, wall_of("blank"))  # What is loaded and cached once is not counted.
+    print(f"{'scene':10} strokes   total  " + "  ".join(STAGES) + "  rest")
+    for scene in sys.argv[1:] or SCENES:
+        wall = wall_of(scene)
+        runs = [timed(planner, wall) for _ in range(REPEATS)]
+        strokes, total, stages = min(runs, key=lambda run: run[1])
+        cells = [f"{stages[name]:{len(name)}.2f}" for name in STAGES]
+        cells.append(f"{total - sum(stages.values()):4.2f}")
+        print(f"{scene:10} {strokes:7d} {total:5.2f} s  " + "  ".join(cells))
+
+
+def wall_of(scene: str) -> WallSegmentation:
+    """Returns the segmentation of a scene, heights noisy."""
+    name, _, seed = scene.partition(":")
+    crowded = name == "crowded"
+    job = load_scenario(
+        "blank" if crowded else name, [f"random_seed={seed}"] if seed else []
+    )
+    wall = true_segmentation(job)
+    depth, mask = np.array(wall.depth), np.array(wall.wall_mask)
+    for x, y, width, height, top in CROWD if crowded else ():
+        rows, columns = (
+            slice(round(low / wall.cell), round((low + size) / wall.cell))
+            for low, size in ((y, height), (x, width))
+        )
+        depth[rows, columns], mask[rows, columns] = top, False
+    noise = np.random.default_rng(1).normal(0.0, NOISE, depth.shape)
+    depth = (depth + noise).astype(np.float32)
+    return wall.replace(depth=depth, wall_mask=mask)
+
+
+def plan(planner: ProgramPlanner, wall: WallSegmentation) -> int:
+    """Plans a tile as the cycle does; returns how many strokes it has."""
+    home = np.deg2rad(planner.motion.home_deg)
+    return len(planner.program(planner.strokes(wall), wall, home).strokes)
+
+
+def timed(
+    planner: ProgramPlanner, wall: WallSegmentation
+) -> tuple[int, float, dict[str, float]]:
+    """Returns the strokes of a tile, the time of the planning, and that by stage, s."""
+    with stage_times() as stages:
+        start = time.process_time()
+        strokes = plan(planner, wall)
+        total = time.process_time() - start
+    return strokes, total, stages
+
+
+@contextmanager
+def stage_times() -> Iterator[dict[str, float]]:
+    """Adds up the time of each stage while the block runs."""
+    spent = dict.fromkeys(STAGES, 0.0)
+
+    def clocked(name: str, call: Callable) -> Callable:
+        def run(*args: Any, **kwargs: Any) -> Any:
+            start = time.process_time()
+            try:
+                return call(*args, **kwargs)
+            finally:
+                spent[name] += time.process_time() - start
+
+        return run
+
+    with ExitStack() as stack:
+        for name, (owner, function) in STAGES.items():
+            call = clocked(name, getattr(owner, function))
+            stack.enter_context(mock.patch.object(owner, function, call))
+        yield spent
+
+
+if __name__ == "__main__":
+    main()
