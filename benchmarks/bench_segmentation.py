@@ -1,69 +1,75 @@
-"""Time, agreement and mask quality of the wall segmentation beside PCL and Open3D.
+"""Time, memory, agreement and masks of the wall segmentation beside PCL and Open3D.
 
 Prints, for each size of a furnished wall (`perception.furnished_wall`), medians of
-seconds by step: the paper's six steps with exact and with fast filter, Open3D's plain
-calls for the first two, and the Point Cloud Library's, side by side in one run. "total"
-and the steps are wall-clock time, "cpu" the processors' time of all threads, and a
-ratio is given by both: on a machine that others use, only the last can be trusted.
+seconds by step, side by side in one run: ours with exact and with fast filter, Open3D's
+plain calls for the first two steps, and the Point Cloud Library's. "filter", "planes"
+and "tile" (grid and regions) make the paper's six steps, their "total"; "cpu" is the
+processors' time of all threads for these. "refine" draws the mask anew by fine steps,
+and "whole" is what `segment_wall` takes. "MB" is how far the process grew at most while
+it ran. On a machine that others use, only the ratio of "cpu" can be trusted.
 Then whether the points removed and the wall agree, and who finds how much of what.
 
-PCL's part is a program of its own, PREFIX.json and PREFIX.csv out of IN.ply; where it
-is comes from --peer or the variable PCL_WALL. Without it, that part is left out.
+PCL's part is a program of its own; where it is comes from --peer or the variable
+PCL_WALL. Without it, that part is left out, as are both peers on clouds of over a
+million points, which take PCL 40 s. The whole takes about six minutes on two cores.
 
     python benchmarks/bench_segmentation.py [POINTS ...] [--peer PATH] [--repeats N]
 """
 
 import argparse
-import json
+import ctypes
 import math
 import os
 import statistics
-import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import open3d as o3d
+from wall_peers import OPTIONS, STEPS, Peer, Times, time_open3d, timed
 
 from perception.config import SegmentationConfig
-from perception.filters import morton_codes, statistical_filter
+from perception.filters import morton_codes
 from perception.furnished_wall import EDGE, FurnishedWall, Thing, furnished_wall
 from perception.planes import segment_planes
-from perception.segmentation import find_planes, segment_tile, segment_wall
-from perception.values import BoolArray, FloatArray
+from perception.refine import refine_segmentation
+from perception.segmentation import find_planes, segment_tile
+from perception.values import BoolArray, FloatArray, Wall
 from perception.wall import choose_plane, wall_on_plane
 
-POINTS = (100_000, 500_000, 1_000_000, 3_000_000)
+POINTS = (100_000, 250_000, 500_000, 1_000_000, 3_000_000)
+ORDERED = 1_000_000
+MOST_FOR_PEERS = 1_000_000
 SIZE = {"width": EDGE, "height": EDGE}
-PEERS = {
-    "PCL": (),
-    "PCL parallel": ("--sor", "omp", "--ransac-threads", "0"),
-}
-# Steps of ours and, by name in the peer's JSON file, of PCL.
-STEPS = {
-    "filter": ("sor",),
-    "planes": ("ransac",),
-    "tile": ("resample", "split_euclid", "split_cc", "tiny", "sort"),
-}
-COLUMNS = (*STEPS, "total", "cpu")
-Times = dict[str, float]
+OURS = {"exact": False, "fast filter": True}  # Name, and whether the filter is fast.
+COLUMNS = (*STEPS, "total", "cpu", "refine", "whole", "MB")
 
 
-@contextmanager
-def timed(times: Times, name: str) -> Iterator[None]:
-    """Adds the seconds of a block to `times[name]`."""
-    start = time.perf_counter()
-    yield
-    times[name] = times.get(name, 0.0) + time.perf_counter() - start
+@dataclass(frozen=True)
+class Outcome:
+    """What a run of ours found.
+
+    Attributes:
+        kept: (N,) True = kept by the filter.
+        wall: The wall.
+        coarse: (ny, nx) wall mask of the paper's steps.
+        fine: (ny, nx) wall mask of `segment_wall`.
+    """
+
+    kept: BoolArray
+    wall: Wall
+    coarse: BoolArray
+    fine: BoolArray
 
 
-def time_ours(wall: FurnishedWall, p_CQs: FloatArray, *, fast: bool) -> Times:
-    """Times the paper's six steps; filter and planes again alone, and the whole."""
+def run_ours(
+    wall: FurnishedWall, p_CQs: FloatArray, *, fast: bool
+) -> tuple[Times, Outcome]:
+    """Does and times what `segment_wall` does; the planes once more, alone."""
     config = SegmentationConfig(fast_filter=fast)
     times: Times = {}
+    before = memory("VmRSS")
     cpu = time.process_time()
     with timed(times, "total"):
         found = find_planes(p_CQs, config=config, seed=0)
@@ -71,9 +77,14 @@ def time_ours(wall: FurnishedWall, p_CQs: FloatArray, *, fast: bool) -> Times:
             size = {**SIZE, "total": found.kept_count}
             number = choose_plane(found.planes, wall.X_CT, **size, config=config)
             plane = wall_on_plane(found.planes[number], wall.X_CT, **size)
-            segment_tile(found, plane, number + 1, **SIZE, config=config)
+            steps = segment_tile(found, plane, number + 1, **SIZE, config=config)
     times["cpu"] = time.process_time() - cpu
-    points = found.p_WQs[:, found.kept]
+    points = found.p_WQs.compress(found.kept, axis=1)
+    with timed(times, "refine"):
+        p_TQs = plane.X_WT.inverse() @ points
+        fine = refine_segmentation(steps.segmentation, p_TQs, config=config, seed=0)
+    times["MB"] = (memory("VmHWM") - before) / 1e6
+    times["whole"] = times["total"] + times["refine"]
     with timed(times, "planes"):
         segment_planes(
             points,
@@ -83,167 +94,107 @@ def time_ours(wall: FurnishedWall, p_CQs: FloatArray, *, fast: bool) -> Times:
             rng=np.random.default_rng(0),
         )
     times["filter"] = times["total"] - times["tile"] - times["planes"]
-    return times
+    coarse = steps.segmentation.wall_mask
+    return times, Outcome(found.kept, plane, coarse, fine.wall_mask)
 
 
-def time_open3d(p_CQs: FloatArray) -> Times:
-    """Times Open3D's plain calls for filter and planes, as its tutorial has them."""
-    times: Times = {}
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p_CQs.T.copy()))
-    cpu = time.process_time()
-    with timed(times, "filter"):
-        cloud, _ = cloud.remove_statistical_outlier(51, 3.5)
-    least = 0.005 * p_CQs.shape[1]
-    with timed(times, "planes"):
-        for _ in range(20):
-            if len(cloud.points) < least:
-                break
-            _, inliers = cloud.segment_plane(0.03, 3, 1000)
-            cloud = cloud.select_by_index(inliers, invert=True)
-    times["total"] = times["filter"] + times["planes"]
-    times["cpu"] = time.process_time() - cpu
-    return times
+def memory(name: str) -> float:
+    """Returns this process's memory, bytes: "VmRSS" now, or "VmHWM" at most since."""
+    process = Path("/proc/self")
+    if name == "VmRSS":
+        ctypes.CDLL(None).malloc_trim(0)  # Gives back what is free ...
+        (process / "clear_refs").write_text("5")  # ... and lets the peak start here.
+    lines = (process / "status").read_text().splitlines()
+    line = next(line for line in lines if line.startswith(name))
+    return 1024.0 * int(line.split()[1])
 
 
-class Peer:
-    """The Point Cloud Library's program, run on one cloud."""
-
-    def __init__(self, program: str, p_CQs: FloatArray, folder: Path) -> None:
-        """Saves the cloud for the program `program` in a folder."""
-        self._program = program
-        self._cloud = folder / "cloud.ply"
-        self._prefix = folder / "out"
-        points = o3d.core.Tensor(np.ascontiguousarray(p_CQs.T.astype(np.float32)))
-        o3d.t.io.write_point_cloud(str(self._cloud), o3d.t.geometry.PointCloud(points))
-
-    def run(self, *options: str) -> Times:
-        """Runs the program and returns its seconds by step, without loading."""
-        subprocess.run(
-            [self._program, self._cloud, "-o", self._prefix, *options]
-            + ["--dump-kept", self._prefix.with_suffix(".kept")],
-            check=True,
-            stdout=subprocess.DEVNULL,
-        )
-        seconds = self.answer["seconds"]
-        cpu = self.answer["cpu_seconds"]["total_without_load"]
-        times = {
-            step: sum(seconds[name] for name in names) for step, names in STEPS.items()
-        }
-        return {**times, "total": seconds["total_without_load"], "cpu": cpu}
-
-    @property
-    def answer(self) -> dict:
-        """What the last run wrote of itself."""
-        return json.loads(self._prefix.with_suffix(".json").read_text())
-
-    @property
-    def kept(self) -> BoolArray:
-        """(N,) True = kept by the last run's filter."""
-        return np.fromfile(self._prefix.with_suffix(".kept"), dtype=np.bool_)
-
-    @property
-    def wall_mask(self) -> BoolArray:
-        """(ny, nx) the last run's wall: all regions of the wall's plane; row 0 low."""
-        labels = np.loadtxt(self._prefix.with_suffix(".csv"), delimiter=",", dtype=int)
-        answer = self.answer
-        wall = [
-            region["label"]
-            for region in answer["regions"]
-            if region["plane"] == answer["wall"]["plane"]
-        ]
-        return np.isin(labels, wall)[::-1]
-
-
-def print_times(name: str, runs: list[Times]) -> Times:
-    """Prints and returns the medians of some runs' seconds by step."""
-    medians = {
-        step: statistics.median(run[step] for run in runs if step in run)
-        for step in COLUMNS
-        if step in runs[0]
-    }
-    cells = (f"{medians.get(step, math.nan):8.3f}" for step in COLUMNS)
-    print(f"  {name:18}", *cells)
-    return medians
-
-
-def print_quality(name: str, wall: FurnishedWall, mask: BoolArray) -> None:
-    """Prints a mask's overlap with the truth and the recall of each thing."""
-    recalls = (f"{wall.recall(mask, thing):8.3f}" for thing in Thing if thing)
-    print(f"  {name:18}", f"{wall.iou(mask):8.4f}", *recalls)
-
-
-def compare(points: int, *, program: str, repeats: int, ordered: bool) -> Times:
-    """Measures one cloud, prints the tables and returns the totals."""
+def compare(points: int, *, program: str, repeats: int, ordered: bool) -> list[Times]:
+    """Measures one cloud, prints the tables and returns the medians of ours."""
     wall = furnished_wall(points, seed=1)
     p_CQs = wall.p_CQs
     if ordered:
         p_CQs = p_CQs[:, np.argsort(morton_codes(p_CQs), kind="stable")]
-    order = "Morton" if ordered else "random"
-    print(f"\n{points} points, {order} order, s")
-    print(" " * 20, *(f"{step:>8}" for step in COLUMNS))
+    print(f"\n{points} points, {'Morton' if ordered else 'random'} order, s")
+    print(" " * 16, *(f"{step:>7}" for step in COLUMNS))
+    peers = points <= MOST_FOR_PEERS
     with tempfile.TemporaryDirectory() as folder:
-        peer = Peer(program, p_CQs, Path(folder)) if program else None
-        jobs = {
-            "exact": lambda: time_ours(wall, p_CQs, fast=False),
-            "fast filter": lambda: time_ours(wall, p_CQs, fast=True),
-            "Open3D, plain": lambda: time_open3d(p_CQs),
-        }
-        if peer is not None:
-            for name, options in PEERS.items():
-                jobs[name] = lambda options=options: peer.run(*options)
-        runs: dict[str, list[Times]] = {name: [] for name in jobs}
+        peer = Peer(program, p_CQs, Path(folder)) if program and peers else None
+        runs: dict[str, list[Times]] = {}
+        outcomes = {}
         for _ in range(repeats):  # In turn, so that all meet the same machine.
-            for name, job in jobs.items():
-                runs[name].append(job())
+            for name, fast in OURS.items():
+                times, outcomes[name] = run_ours(wall, p_CQs, fast=fast)
+                runs.setdefault(name, []).append(times)
+            if peers:
+                runs.setdefault("Open3D, plain", []).append(time_open3d(p_CQs))
+            for name in OPTIONS if peer is not None else ():
+                runs.setdefault(name, []).append(peer.run(name))
         medians = {name: print_times(name, some) for name, some in runs.items()}
-        for name in ("exact", "fast filter"):
-            for other in PEERS if peer is not None else ():
-                ratios = (medians[name][by] / medians[other][by] for by in COLUMNS[-2:])
-                print(f"  {name} / {other}:", *(f"{ratio:.3f}" for ratio in ratios))
-        if not ordered:
-            print_agreement(wall, peer)
-    return {name: median["total"] for name, median in medians.items()}
+        for name in OURS:
+            for other in OPTIONS if peer is not None else ():
+                ratios = (
+                    f"{by} {medians[name][by] / medians[other][by]:.3f}"
+                    for by in ("total", "cpu")
+                )
+                print(f"  {name} / {other}:", *ratios)
+        print_agreement(wall, outcomes, peer)
+    return [medians[name] for name in OURS]
 
 
-def print_agreement(wall: FurnishedWall, peer: Peer | None) -> None:
+def print_times(name: str, runs: list[Times]) -> Times:
+    """Prints and returns the medians of some runs' figures."""
+    medians = {step: statistics.median(run[step] for run in runs) for step in runs[0]}
+    cells = (
+        (f"{medians[step]:7.0f}" if step == "MB" else f"{medians[step]:7.3f}")
+        if step in medians
+        else f"{'-':>7}"
+        for step in COLUMNS
+    )
+    print(f"  {name:14}", *cells)
+    return medians
+
+
+def print_agreement(
+    wall: FurnishedWall, outcomes: dict[str, Outcome], peer: Peer | None
+) -> None:
     """Prints whether removed points and wall plane agree, and the masks' quality."""
-    p_CQs = wall.p_CQs
-    config = SegmentationConfig()
-    options = {
-        "neighbors": config.neighbors,
-        "std_multiplier": config.std_multiplier,
-    }
-    keep = statistical_filter(p_CQs, **options)
-    fast = statistical_filter(p_CQs, **options, fast=True)
-    print(f"  removed: {np.count_nonzero(~keep)}; ", end="")
-    print(f"otherwise by the fast filter: {np.count_nonzero(fast != keep)}", end="")
-    found = find_planes(p_CQs, config=config, seed=0)
-    size = {**SIZE, "total": found.kept_count}
-    number = choose_plane(found.planes, wall.X_CT, **size, config=config)
-    plane = wall_on_plane(found.planes[number], wall.X_CT, **size)
+    exact, fast = outcomes.values()
+    print(f"  removed: {np.count_nonzero(~exact.kept)};", end=" ")
+    print(
+        f"otherwise by fast filter: {np.count_nonzero(fast.kept != exact.kept)}", end=""
+    )
+    masks = {"paper's steps": exact.coarse, "segment_wall": exact.fine}
     if peer is not None:
-        peer.run()
-        print(f", by PCL: {np.count_nonzero(peer.kept != keep)}")
-        *normal, offset = peer.answer["planes"][peer.answer["wall"]["plane"] - 1][
-            "abcd"
-        ]
-        z_C = plane.X_WT.rotation().matrix()[:, 2]
-        tilt = np.linalg.norm(np.cross(normal, z_C)) / np.linalg.norm(normal)
-        middle = plane.X_WT @ np.array([EDGE / 2, EDGE / 2, 0.0])
-        off = abs(normal @ middle + offset) / np.linalg.norm(normal)
-        print(
-            f"  wall planes apart: {1e3 * off:.3f} mm,",
-            f"{math.degrees(math.asin(tilt)):.4f} deg",
-            end="",
+        print(f", PCL: {np.count_nonzero(peer.kept('PCL') != exact.kept)}", end="")
+        answer = peer.answer("PCL")
+        *normal, offset = answer["planes"][answer["wall"]["plane"] - 1]["abcd"]
+        length = np.linalg.norm(normal)
+        z_C = exact.wall.X_WT.rotation().matrix()[:, 2]
+        tilt = math.asin(np.linalg.norm(np.cross(normal, z_C)) / length)
+        middle = exact.wall.X_WT @ np.array([EDGE / 2, EDGE / 2, 0.0])
+        off = abs(normal @ middle + offset) / length
+        print(f"; wall plane: {1e3 * off:.3f} mm, {math.degrees(tilt):.4f} deg", end="")
+        masks["PCL"] = peer.wall_mask("PCL")
+    things = [thing for thing in Thing if thing]
+    print(
+        "\n  mask                IoU", *(f"{thing.name.lower():>7}" for thing in things)
+    )
+    for name, mask in masks.items():
+        recalls = (f"{wall.recall(mask, thing):7.3f}" for thing in things)
+        print(f"  {name:14} {wall.iou(mask):7.4f}", *recalls)
+
+
+def print_growth(medians: dict[int, list[Times]]) -> None:
+    """Prints the exponents of time and memory against points, fitted to all sizes."""
+    points = np.log(list(medians))
+    print(f"\ngrowth from {min(medians)} to {max(medians)} points, fitted exponents")
+    for name, runs in zip(OURS, zip(*medians.values(), strict=True), strict=True):
+        exponents = (
+            f"{by} {np.polyfit(points, np.log([run[by] for run in runs]), 1)[0]:.2f}"
+            for by in ("total", "whole", "MB")
         )
-    names = (f"{thing.name.lower():>8}" for thing in Thing if thing)
-    print("\n  mask              ", "     IoU", *names)
-    tile = segment_tile(found, plane, number + 1, **SIZE, config=config)
-    print_quality("paper's steps", wall, tile.segmentation.wall_mask)
-    whole = segment_wall(p_CQs, wall.X_CT, **SIZE, config=config, seed=0)
-    print_quality("segment_wall", wall, whole.wall_mask)
-    if peer is not None:
-        print_quality("PCL", wall, peer.wall_mask)
+        print(f"  {name:14}", ", ".join(exponents))
 
 
 def main() -> None:
@@ -256,14 +207,11 @@ def main() -> None:
     options = {"program": args.peer, "repeats": args.repeats}
     if not args.peer:
         print("PCL is left out: neither --peer nor PCL_WALL says where pcl_wall is.")
-    totals = {n: compare(n, **options, ordered=False) for n in args.points}
-    compare(1_000_000, **options, ordered=True)
-    low, high = min(totals), max(totals)
-    if low < high:
-        print(f"\ngrowth from {low} to {high} points, exponent")
-        for name in totals[low]:
-            ratio = totals[high][name] / totals[low][name]
-            print(f"  {name:18} {math.log(ratio) / math.log(high / low):.2f}")
+    medians = {n: compare(n, **options, ordered=False) for n in args.points}
+    if len(medians) > 1:
+        print_growth(medians)
+    if ORDERED in medians:
+        compare(ORDERED, **options, ordered=True)
 
 
 if __name__ == "__main__":

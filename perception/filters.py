@@ -14,10 +14,12 @@ _MORTON_BITS = 21  # Three coordinates of 21 bits fit one 64-bit code.
 # that not all figures can be the same, for so many neighbours.
 _LARGE_CLOUD = 20_000
 _MANY_NEIGHBORS = 8
-# The fast filter: share of points above its first guess of the threshold; and dense
-# points that stand for all dense ones, at least: this many, and so many drawn evenly.
+# The fast filter: share of points above its first guess of the threshold; and points
+# that stand for all dense ones, at least: this many and this share; so many of them are
+# drawn evenly.
 _SPARSE_SHARE = 0.005
-_SAMPLE = 40_000
+_SAMPLE = 16_000
+_SAMPLE_SHARE = 0.025
 _EVEN_SAMPLE = 8_000
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 
@@ -232,7 +234,8 @@ def _shares(bounds: FloatArray, guess: float) -> FloatArray:
     ratios = np.minimum(bounds / guess, 1.0)
     shares = ratios * ratios * ratios
     dense = ratios < 1.0
-    scale = max(1.0, _SAMPLE / max(1e-9, shares[dense].sum()))
+    sample = _SAMPLE + _SAMPLE_SHARE * bounds.size
+    scale = max(1.0, sample / max(1e-9, shares[dense].sum()))
     least = _EVEN_SAMPLE / bounds.size
     shares[dense] = np.clip(scale * shares[dense], least, 1.0)
     return shares
