@@ -6,6 +6,8 @@ same code, so that tests without a camera run what the robot runs.
 
 import logging
 import math
+import subprocess
+import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -22,6 +24,7 @@ from perception.pinhole import PinholeMap
 _LOGGER = logging.getLogger(__name__)
 _QUEUE = 4
 _DEPTH_UNIT = 0.001
+_TRY_TIME = 25.0  # s
 
 
 def open_device(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSense":
@@ -51,6 +54,7 @@ def open_recording(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "Rea
     """
     if not Path(config.recording).is_file():
         raise CameraError(f"camera: {config.recording}: no such recording.")
+    _try_recording(config.recording)
     try:
         device = rs.context().load_device(config.recording)
     except RuntimeError as error:
@@ -319,6 +323,34 @@ def apply_options(sensor: Any, config: CameraDriverConfig) -> None:
             raise CameraError(
                 f"camera: {option.name} was set to {value} and reads {found:g}."
             )
+
+
+def _try_recording(path: str) -> None:
+    """Opens a recording in a process of its own: a damaged one may crash librealsense.
+
+    Raises:
+        CameraError: It cannot be opened.
+    """
+    code = (
+        "import sys, pyrealsense2 as rs\n"
+        "try: rs.context().load_device(sys.argv[1])\n"
+        "except RuntimeError as error: sys.exit(str(error))"
+    )
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code, path],
+            capture_output=True,
+            timeout=_TRY_TIME,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise CameraError(
+            f"camera: {path}: librealsense takes over {_TRY_TIME:g} s to open it."
+        ) from error
+    if done.returncode != 0:
+        words = done.stderr.decode(errors="replace").split()
+        reason = " ".join(words) or f"it ended with {done.returncode}"
+        raise CameraError(f"camera: {path}: librealsense cannot open it: {reason}.")
 
 
 def _stream(kind: Any, form: Any, size: int, camera: CameraIntrinsics, fps: int) -> Any:

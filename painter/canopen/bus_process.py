@@ -26,7 +26,13 @@ from painter.canopen.feedback import Feedback, Phase
 from painter.canopen.frame_log import FrameLogger, TappedLink
 from painter.canopen.links import Link, open_link
 from painter.canopen.mailbox import Mailbox
-from painter.canopen.realtime import Lateness, Ticker, settle_memory, use_fifo
+from painter.canopen.realtime import (
+    Lateness,
+    Ticker,
+    lock_memory,
+    settle_memory,
+    use_fifo,
+)
 from painter.canopen.sample_ring import SampleRing, Samples
 from painter.canopen.setpoints import Setpoint
 from painter.errors import BusError, PainterError
@@ -95,8 +101,10 @@ class BusLoop:
         """Runs until the other side asks to end, or is gone, and the arm is off."""
         self._is_fifo = use_fifo()
         settle_memory()
+        lock_memory()
         per_second = max(1, round(1.0 / self._ticker.period))
         count = 0
+        self._ticker.begin()  # Locking took a second.
         while not self._has_ended():
             while (remaining := self._ticker.remaining()) > 0.0:
                 # Frames between two SYNCs are read at once: a fault need not wait.

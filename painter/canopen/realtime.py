@@ -1,5 +1,6 @@
 """A loop with due times on the monotonic clock, and how late it was."""
 
+import ctypes
 import gc
 import logging
 import os
@@ -10,6 +11,13 @@ import numpy as np
 
 _LOGGER = logging.getLogger(__name__)
 _PRIORITY = 60
+# The loop is awake so long before a tick: what has come is read, then the clock is
+# watched. It must cover waking up (0.05 to 0.15 ms) and the reading (0.1 to 0.2 ms);
+# at 200 Hz it costs up to 10 % of a core.
+LEAD = 0.0005
+# Source: Linux, include/uapi/linux/mman.h and prctl.h.
+_MCL_CURRENT_AND_FUTURE = 3
+_PR_SET_TIMERSLACK = 29
 _KEPT = 12_000  # A minute at 200 Hz; sorting them takes less than a cycle.
 
 
@@ -62,17 +70,21 @@ class Ticker:
             period: Time between two ticks, s.
         """
         self.period = period
-        self.due = time.monotonic() + period
         self.overruns = 0
+        self.begin()
         self._late = np.zeros(_KEPT)
         self._count = 0
 
+    def begin(self) -> None:
+        """Makes the next tick due one period from now."""
+        self.due = time.monotonic() + self.period
+
     def remaining(self) -> float:
-        """Time to the next tick, s; not negative."""
-        return max(0.0, self.due - time.monotonic())
+        """Time until `LEAD` before the next tick, s; not negative."""
+        return max(0.0, self.due - LEAD - time.monotonic())
 
     def tick(self) -> tuple[float, int]:
-        """Ends the wait for a tick that is due.
+        """Ends the wait for a tick that is due at once or in `LEAD`.
 
         Returns:
             When it was due, s, and how many ticks were skipped before it because their
@@ -85,9 +97,11 @@ class Ticker:
         self.due = due + self.period
         return due, skipped
 
-    def note(self) -> None:
-        """Notes how late the work of the last tick begins."""
-        late = time.monotonic() - (self.due - self.period)
+    def meet(self) -> None:
+        """Watches the clock until the last tick is due, and notes how late that is."""
+        due = self.due - self.period
+        while (late := time.monotonic() - due) < 0.0:
+            pass
         self._late[self._count % _KEPT] = late
         self._count += 1
 
@@ -102,3 +116,19 @@ def settle_memory() -> None:
     """Leaves what was imported out of garbage collection, which takes 20 ms."""
     gc.collect()
     gc.freeze()
+
+
+def lock_memory() -> bool:
+    """Keeps this process's pages in memory and its timers sharp, where allowed.
+
+    For a process of its own: all that it has and will have is locked.
+
+    Returns:
+        Whether the pages are locked; if not, it is logged.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    if libc.mlockall(_MCL_CURRENT_AND_FUTURE) == 0:
+        return True
+    _LOGGER.info("memory is not locked: %s", os.strerror(ctypes.get_errno()))
+    return False

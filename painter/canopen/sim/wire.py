@@ -77,9 +77,13 @@ class Wire:
             self._free = end
             self.busy_time += end - start
             self.frame_count += 1
-            for port, receive in enumerate(self._receivers):
-                if port != item.port:
-                    receive(item.frame, end)
+            self._deliver(item.frame, item.port, end)
+
+    def _deliver(self, frame: Frame, sender: int, end: float) -> None:
+        """Hands a frame to all ports but its sender's."""
+        for port, receive in enumerate(self._receivers):
+            if port != sender:
+                receive(frame, end)
 
     def _choose(self) -> tuple[float, _Pending]:
         """Start time and frame that wins the next arbitration."""
