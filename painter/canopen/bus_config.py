@@ -98,6 +98,7 @@ class Timeouts:
         heartbeat: Without a heartbeat of a node (or, in the drives, of the master).
         tpdo: Without a process data object of a drive.
         setpoint: Without a setpoint while moving or spraying.
+        rpdo_cycles: Cycles without a process data object of the master, in the drives.
     """
 
     boot: float = 2.0
@@ -108,6 +109,7 @@ class Timeouts:
     heartbeat: float = 0.3
     tpdo: float = 0.02
     setpoint: float = 0.05
+    rpdo_cycles: int = 4
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -168,6 +170,8 @@ class IoConfig:
         flow_full_scale: Value of 6411h:1 at nominal flow.
         pressure_scale: Pressure of the pump at one count of 6401h:1, Pa.
         pressure_low: Pressure below which spraying stops the arm, Pa.
+        rpdo_cycles: Cycles without a process data object of the master after which the
+            node closes the gun by itself.
     """
 
     node_id: int = 6
@@ -177,6 +181,7 @@ class IoConfig:
     flow_full_scale: int = 32767
     pressure_scale: float = 1000.0
     pressure_low: float = 0.0
+    rpdo_cycles: int = 2
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -259,9 +264,11 @@ class BusConfig:
         for name, limits in self.joints.items():
             _check_joint(f"joints.{name}", limits)
         for name in (f.name for f in dataclasses.fields(Timeouts)):
-            if name != "sdo_retries":
+            if name not in ("sdo_retries", "rpdo_cycles"):
                 _check_positive(f"timeouts.{name}", getattr(self.timeouts, name))
         _check_range("timeouts.sdo_retries", self.timeouts.sdo_retries, 0, 100)
+        _check_range("timeouts.rpdo_cycles", self.timeouts.rpdo_cycles, 2, 1000)
+        _check_range("io.rpdo_cycles", self.io.rpdo_cycles, 2, 1000)
         _check_range("io.valve_bit", self.io.valve_bit, 0, 7)
         _check_range("io.estop_bit", self.io.estop_bit, 0, 7)
         _check_range("io.flow_full_scale", self.io.flow_full_scale, 1, 32767)

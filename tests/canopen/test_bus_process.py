@@ -44,8 +44,9 @@ def bus(tmp_path):
     # Drives and bus share two cores with other tests: seconds, not milliseconds.
     bus.timeouts = dataclasses.replace(
         bus.timeouts, heartbeat=3.0, tpdo=2.0, setpoint=2.0, boot=20.0, sdo=2.0,
-        brake=20.0, transition=20.0,
+        brake=20.0, transition=20.0, rpdo_cycles=200,
     )  # fmt: skip
+    bus.io = dataclasses.replace(bus.io, rpdo_cycles=200)
     return bus
 
 

@@ -40,6 +40,7 @@ NMT_RESET_COMMUNICATION = 130
 
 HEARTBEAT_LOST = 0x8130
 PDO_LENGTH = 0x8210
+RPDO_TIMEOUT = 0x8250
 BOOT_TIME = 0.02
 
 
@@ -66,6 +67,9 @@ class SimNode:
         self._latched: list[tuple[Pdo, bytes]] = []
         self._sync_count = 0
         self._next_event: dict[int, float] = {}
+        # When each RPDO came, and which stay away.
+        self._came: dict[int, float] = {}
+        self._overdue: set[int] = set()
         self._sent: dict[int, bytes] = {}
 
     # What children add.
@@ -127,6 +131,7 @@ class SimNode:
             self.send(HEARTBEAT_BASE + self.node_id, bytes([self.nmt]))
         self._watch_heartbeats()
         if self.nmt == Nmt.OPERATIONAL:
+            self._watch_rpdos()
             self._send_events()
 
     def reboot(self) -> None:
@@ -152,6 +157,7 @@ class SimNode:
             self.pdos.invalidate()
             self.sdo.reset()
             self._heard, self._latched, self._sent = {}, [], {}
+            self._came, self._overdue = {}, set()
             self.nmt = Nmt.INITIALISING
             self._boot_at = self.now + BOOT_TIME
             if not only:
@@ -180,7 +186,12 @@ class SimNode:
                 continue
             if len(frame.data) < sum(size for _, _, size in pdo.objects):
                 self.emergency(PDO_LENGTH, 0x11)
-            elif pdo.transmission <= 240:
+                continue
+            self._came[pdo.number] = self.now
+            if pdo.number in self._overdue:
+                self._overdue.remove(pdo.number)
+                self.emergency(0, 0)
+            if pdo.transmission <= 240:
                 self._latched.append((pdo, frame.data))
             else:
                 self._apply(pdo, frame.data)
@@ -220,6 +231,17 @@ class SimNode:
             data = self.pdos.data(pdo)
             self._sent[pdo.number] = data
             self.send(pdo.cob_id, data)
+
+    def _watch_rpdos(self) -> None:
+        """RPDO deadlines, 140xh:5, clause 7.5.2.35; armed by the first RPDO."""
+        for pdo in self.pdos.received():
+            came = self._came.get(pdo.number)
+            if came is None or not pdo.event_time or pdo.number in self._overdue:
+                continue
+            if self.now - came > pdo.event_time:
+                self._overdue.add(pdo.number)
+                self.emergency(RPDO_TIMEOUT, 0x11)
+                self.on_connection_lost()
 
     def _watch_heartbeats(self) -> None:
         """Consumer heartbeat time, 1016h; armed by the first heartbeat heard."""
