@@ -9,7 +9,7 @@ from painter.planning.reach import require_reach
 from painter.planning.spray_path import SkippedStroke, Stroke
 from perception.values import BoolArray, FloatArray
 
-_STEP = 0.02  # m along a stroke, between the places that are looked at.
+_STEP = 0.03  # m along a stroke, between the places that are looked at.
 # m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
 # the room in which the arm stops and turns at 0.6 m/s.
 _STOPPING = 0.12

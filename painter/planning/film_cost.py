@@ -58,12 +58,18 @@ class FilmCost(FrozenValue):
             wanted: Cells to be painted, the last axes of that shape.
             clean: Cells of the tile that stay clean.
         """
-        bare = np.clip((self.bare[0] - film) / (self.bare[0] - self.bare[1]), 0.0, 1.0)
-        on = bare + _UNEVEN * (film - 1.0) ** 2
-        low, high = self.soiled
-        soiled = np.clip((film - low) / (high - low), 0.0, 1.0)
-        off = _SPILT * film + self.soiled_weight * clean * soiled
+        on = _ramp(film, *self.bare) + _UNEVEN * (film - 1.0) ** 2
+        off = _SPILT * film
+        if clean.any():
+            off += self.soiled_weight * clean * _ramp(film, *self.soiled)
         return np.asarray(np.where(wanted, on, off))
+
+
+def _ramp(film: FloatArray, begin: float, full: float) -> FloatArray:
+    """Returns 0 up to `begin`, 1 from `full` on, a straight line between them."""
+    share = (film - begin) / (full - begin)
+    # As `np.clip`, which takes four times as long on a patch of film.
+    return np.asarray(np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share))
 
 
 def stroke_cost(length: float) -> float:

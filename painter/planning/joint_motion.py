@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,6 +28,7 @@ _DENSE_STEP = 0.004  # s, of the second look at a move that was found.
 _TORQUE_EVERY = 5  # Of these samples, one is looked at for torque.
 _SLOWER = 1.05  # By which a move is slowed that fails the second look,
 _SLOWER_STEPS = 30  # and how often.
+_AT_A_TIME = 8  # Durations that are looked at together.
 
 
 class Segment(Protocol):
@@ -186,11 +187,13 @@ def fastest_joint_blend(
 
     def allowed(durations: FloatArray) -> BoolArray:
         first, second = plateaus(start, end, durations)
-        q, v = evaluate(start, end, durations, s)
         peak = np.maximum(np.abs(first), np.abs(second))
         keeps = (peak <= SEARCH_SHARE * limits.a_max).all(axis=1)
-        keeps &= (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
-        return np.asarray(keeps & limits.contains(q).all(axis=1))
+        if keeps.any():
+            q, v = evaluate(start, end, durations[keeps], s)
+            slow = (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
+            keeps[keeps] = slow & limits.contains(q).all(axis=1)
+        return np.asarray(keeps)
 
     def certain(duration: float) -> bool:
         return keeps_limits(JointBlend(start, end, duration).q, duration, limits)
@@ -244,18 +247,25 @@ def shortest(
         durations: (n,) s, ascending grid.
         certain: A slower and closer look at one duration that is allowed.
     """
-    good = allowed(durations)
-    if not good.any():
+    found = next(_in_turn(allowed, durations), None)
+    if found is None:
         return None
-    first = int(np.argmax(good))
+    first = int(np.searchsorted(durations, found))
     before = durations[max(first - 1, 0)]
-    between = np.linspace(before, durations[first], 8)[1:-1]
-    longer = durations[first] * _SLOWER ** np.arange(1, _SLOWER_STEPS)
-    tries = np.unique(
-        np.concatenate([between, durations[good], longer[longer < durations[-1]]])
-    )
-    tries = tries[allowed(tries)]
-    return next((float(duration) for duration in tries if certain(duration)), None)
+    between = np.linspace(before, found, 8)[1:-1]
+    longer = found * _SLOWER ** np.arange(1, _SLOWER_STEPS)
+    slower = np.unique(np.append(durations[first:], longer[longer < durations[-1]]))
+    tries = itertools.chain(_in_turn(allowed, between), _in_turn(allowed, slower))
+    return next((duration for duration in tries if certain(duration)), None)
+
+
+def _in_turn(
+    allowed: Callable[[FloatArray], BoolArray], durations: FloatArray
+) -> Iterator[float]:
+    """Yields those durations that are allowed, looking at some at a time."""
+    for first in range(0, len(durations), _AT_A_TIME):
+        some = durations[first : first + _AT_A_TIME]
+        yield from some[allowed(some)].tolist()
 
 
 def chain(

@@ -90,15 +90,28 @@ def verify_strokes(
             f"program: the gun opens {len(motion.spray_on)} times for "
             f"{len(program.strokes)} strokes."
         )
-    for number, stroke in enumerate(program.strokes):
-        opens, closes = motion.spray_on[number] + valve_delay
-        time = _dense(opens, closes)
-        q = motion.trajectory.vector_values(time).T
-        p_TGs, axis_T = _gun_in_tile(q, program.X_WT, kinematics)
+    opened = motion.spray_on + valve_delay
+    times = [_dense(float(opens), float(closes)) for opens, closes in opened]
+    if not times:
+        return
+    q = motion.trajectory.vector_values(np.concatenate(times)).T
+    p_TGs, axes_T = _gun_in_tile(q, program.X_WT, kinematics)
+    ends = np.cumsum([len(time) for time in times])[:-1]
+    for number, (stroke, time, p_TG, axis_T) in enumerate(
+        zip(
+            program.strokes,
+            times,
+            np.split(p_TGs, ends),
+            np.split(axes_T, ends),
+            strict=True,
+        )
+    ):
+        opens, closes = opened[number]
         along = (stroke.end_T - stroke.start_T) / stroke.length
         ideal = stroke.start_T + np.outer((time - opens) * stroke.speed, along)
         off_axis_deg = np.rad2deg(np.arccos(np.clip(-axis_T[:, 2], -1.0, 1.0)))
-        speed = np.linalg.norm(np.gradient(p_TGs[:, :2], time, axis=0), axis=1)
+        step = time[1] - time[0]
+        speed = np.linalg.norm(np.diff(p_TG[:, :2], axis=0), axis=1) / step
         end = stroke.start_T + along * stroke.speed * (closes - opens)
         what = f"stroke {number + 1}"
         for name, unit, values, bound in (
@@ -108,15 +121,10 @@ def verify_strokes(
                 speed - stroke.speed,
                 _SPEED_TOLERANCE * stroke.speed,
             ),
-            (
-                "stand-off error",
-                "m",
-                p_TGs[:, 2] - stroke.standoff,
-                _STANDOFF_TOLERANCE,
-            ),
+            ("stand-off error", "m", p_TG[:, 2] - stroke.standoff, _STANDOFF_TOLERANCE),
             ("gun angle", "deg", off_axis_deg, _ANGLE_TOLERANCE_DEG),
-            ("place across x", "m", p_TGs[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
-            ("place along y", "m", p_TGs[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
+            ("place across x", "m", p_TG[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
+            ("place along y", "m", p_TG[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
             ("end", "m", end - stroke.end_T, _PLACE_TOLERANCE),
         ):
             _require_within(f"{what}: {name}", unit, time, values, bound)
