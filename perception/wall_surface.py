@@ -1,39 +1,33 @@
-"""The wall's own surface over the tile: flat, bulged, twisted or wavy, with normals.
+"""The wall's own surface over the tile: flat, bulged, twisted, wavy or bent in corners.
 
-A tensor-product cubic B-spline is fitted to the cells' depths by iteratively reweighted
-least squares with Tukey's biweight. A penalty on third differences of the coefficients
-makes it a quadratic (which holds tilt, bulge and twist) where it is strong, and bridges
-what is not wall where it is weak.
+The depths fall into patches within which nothing steps. A spline is fitted to the patch
+of the wall by iteratively reweighted least squares with Tukey's biweight, and patches
+that it runs on in join it. A large patch that meets the wall in an edge without a step
+is another wall in a corner, and a surface of its own.
 
-Source: Eilers and Marx, "Flexible smoothing with B-splines and penalties", 1996;
-Beaton and Tukey, "The fitting of power series", 1974 (biweight).
+A moulding is wall where the surface follows it: gentle in slope and wider than about
+half a metre. What rises sharply is a step, however low, and no part of the surface.
+
+Source: Beaton and Tukey, "The fitting of power series", 1974 (biweight); for the
+splines see `perception.spline_surface`.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.ndimage import distance_transform_edt
 
-from perception.planes import ransac_plane
-from perception.values import BoolArray, FloatArray, FrozenValue
+from perception.smooth_patches import smooth_patches
+from perception.values import BoolArray, FloatArray, FrozenValue, IntArray
+from perception.wall_corners import part_at_corners
+from perception.wall_piece import Blocks, Piece, fit_piece, run_on, surface_normals
 
-_KNOT = 0.25
-"""Distance of knots, m: waves from about twice that length are followed, and a plate of
-0.2 m or more is bridged and not climbed."""
-_STIFF, _SOFT = 1e6, 1e-2
-"""Weight of the penalty against that of a cell: first a quadratic, then the spline."""
-_RIDGE = 1e-9
-_REPEATS = 3
 _FIT_CELL = 0.02
+_EDGE_BLOCKS = 3.0
 _LEAST_CELLS = 500
-_START_POINTS = 20_000
-_START_THRESHOLD = 0.004
-_LEAST_WINDOW = 0.003
-"""Cells farther off than a few times the noise, but at least this, count nothing, m."""
-_WINDOWS = (16.0, 10.0, 6.0)
-"""The same in standard deviations of the noise, from the first fits to the last."""
-_LEAST_SHARE = 0.2
+_NEAR = 0.03  # Standard deviation about T's plane within which the wall is looked for.
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,37 +66,41 @@ def fit_wall_surface(
     use = wall & np.isfinite(depth)
     if not use.any():
         raise ValueError("no cell of the wall has a depth.")
-    noise = neighbour_noise(depth, use)
     y, x = (_centres(count, cell) for count in depth.shape)
-    # Splines of 0.25 m do not need every cell; the medians of blocks have less noise.
     step = max(1, round(_FIT_CELL / cell))
     if np.count_nonzero(use) < _LEAST_CELLS * step**2:
         step = 1
-    blocks = _block_medians(np.where(use, depth, np.nan), step)
-    middle_y, middle_x = (_centres(count, step * cell) for count in blocks.shape)
-    use = np.isfinite(blocks)
-    spread = neighbour_noise(blocks, use)
-    height = _first_plane(blocks, use, middle_x, middle_y, noise=spread, rng=rng)
-    across, along = _basis(x, x), _basis(y, y)
-    fit = _Fit(_basis(middle_y, y), _basis(middle_x, x))
-    values = np.where(use, blocks, 0.0)
-    for penalty in (_STIFF, _SOFT):
-        for window in np.repeat(_WINDOWS, _REPEATS):
-            limit = max(_LEAST_WINDOW, window * spread)
-            off = np.where(use, (values - height) / limit, 1.0)
-            weight = np.square(np.maximum(1.0 - off * off, 0.0))
-            if not weight.any():
-                raise ValueError("the wall's cells lie on no surface.")
-            coefficients = fit.solve(weight, values, penalty)
-            height = fit.along @ coefficients @ fit.across.T
-    height = along @ coefficients @ across.T
-    slopes = [np.gradient(height, cell, axis=axis) for axis in (1, 0)]
-    normals = np.stack([-slopes[0], -slopes[1], np.ones_like(height)], axis=-1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return WallSurface(height=height, normals=normals, noise=noise)
+    medians = _block_medians(depth, step)
+    # Over such blocks the slope of waves is no longer small.
+    spread = neighbour_noise(medians, np.isfinite(medians), order=2)
+    blocks = Blocks(
+        depth=medians,
+        patches=smooth_patches(medians, noise=spread),
+        y=_centres(medians.shape[0], step * cell),
+        x=_centres(medians.shape[1], step * cell),
+        within=np.array([y[[0, -1]], x[[0, -1]]]),
+        cell=step * cell,
+        noise=spread,
+        rng=rng,
+    )
+    may_be = np.isfinite(_block_medians(np.where(use, depth, np.nan), step))
+    parts = part_at_corners(blocks, _patch_of_wall(blocks, may_be))
+    # No piece runs on in blocks of another's patches.
+    others = np.unique(blocks.patches[np.any(parts, axis=0)])
+    free = np.where(np.isin(blocks.patches, others), -1, blocks.patches)
+    blocks = dataclasses.replace(blocks, patches=free)
+    pieces = [run_on(fit_piece(blocks, cells), blocks) for cells in parts]
+    heights = np.stack(
+        [piece.spline.heights_at(y, x, piece.coefficients) for piece in pieces]
+    )
+    normals = np.stack([surface_normals(height, cell) for height in heights])
+    owner = _owners(pieces, heights, blocks, y, x)[np.newaxis]
+    height = np.take_along_axis(heights, owner, axis=0)[0]
+    normal = np.take_along_axis(normals, owner[..., np.newaxis], axis=0)[0]
+    return WallSurface(height=height, normals=normal, noise=neighbour_noise(depth, use))
 
 
-def neighbour_noise(depth: FloatArray, use: BoolArray) -> float:
+def neighbour_noise(depth: FloatArray, use: BoolArray, *, order: int = 1) -> float:
     """Estimates the noise of depths from the differences of cells side by side.
 
     The median makes it blind to steps, and neighbours to the wall's shape.
@@ -110,48 +108,58 @@ def neighbour_noise(depth: FloatArray, use: BoolArray) -> float:
     Args:
         depth: (ny, nx) m.
         use: (ny, nx) cells to use.
+        order: Of the differences; the second do not see slopes.
 
     Returns:
         Standard deviation of one cell, m; 0 if no two cells lie side by side.
     """
-    steps = np.diff(np.where(use, depth, np.nan), axis=1)
+    steps = np.diff(np.where(use, depth, np.nan), n=order, axis=1)
     steps = np.abs(steps[np.isfinite(steps)])
     if steps.size == 0:
         return 0.0
-    # The median of |a - b| of two normal values is 0.6745 sqrt(2) standard deviations.
-    return float(np.median(steps)) / (0.6745 * math.sqrt(2.0))
+    # The median of |a - b| of two normal values is 0.6745 sqrt(2) standard deviations,
+    # that of |a - 2 b + c| 0.6745 sqrt(6).
+    scale = math.sqrt(math.comb(2 * order, order))
+    return float(np.median(steps)) / (0.6745 * scale)
 
 
-def _first_plane(
-    depth: FloatArray,
-    use: BoolArray,
-    x: FloatArray,
+def _patch_of_wall(blocks: Blocks, may_be: BoolArray) -> BoolArray:
+    """Returns the blocks of the patch that most of the wall's plane lies in."""
+    near = np.exp(-0.5 * np.square(blocks.depth[may_be] / _NEAR))
+    share = np.bincount(blocks.patches[may_be], near)
+    main: BoolArray = blocks.patches == int(share.argmax())
+    return main
+
+
+def _owners(
+    pieces: list[Piece],
+    heights: FloatArray,
+    blocks: Blocks,
     y: FloatArray,
-    *,
-    noise: float,
-    rng: np.random.Generator,
-) -> FloatArray:
-    """Returns the heights of the plane that most cells share within a fine threshold.
+    x: FloatArray,
+) -> IntArray:
+    """Returns (ny, nx): the piece that each cell belongs to.
 
-    Between a wall and a door 2 cm deeper least squares would lie between the two.
+    That is the one whose blocks are nearest. Along an edge, where blocks are too coarse
+    for it, it is the one before the other where the walls close in, and the one behind
+    it where they fall away.
     """
-    rows, columns = np.nonzero(use)
-    step = max(1, rows.size // _START_POINTS)
-    rows, columns = rows[::step], columns[::step]
-    points = np.stack([x[columns], y[rows], depth[rows, columns]])
-    threshold = max(_START_THRESHOLD, 3.0 * noise)
-    found = ransac_plane(points, threshold=threshold, rng=rng)
-    flat = np.full(depth.shape, float(np.median(points[2])))
-    if found is None:
-        return flat
-    plane, inliers = found
-    nx, ny, nz = plane.normal
-    if inliers.mean() < _LEAST_SHARE or abs(nz) < math.cos(math.radians(30.0)):
-        return flat
-    height: FloatArray = (
-        plane.offset - nx * x[np.newaxis] - ny * y[:, np.newaxis]
-    ) / nz
-    return height
+    rows = np.minimum((y / blocks.cell).astype(np.int64), blocks.y.size - 1)
+    columns = np.minimum((x / blocks.cell).astype(np.int64), blocks.x.size - 1)
+    distances = np.stack(
+        [
+            distance_transform_edt(~piece.cells)[np.ix_(rows, columns)]
+            for piece in pieces
+        ]
+    )
+    owner = np.asarray(distances.argmin(axis=0), dtype=np.int64)
+    for number, piece in enumerate(pieces[1:], start=1):
+        rise = np.median((piece.height - pieces[0].height)[piece.cells])
+        edge = np.isin(owner, (0, number))
+        edge &= np.abs(distances[number] - distances[0]) <= _EDGE_BLOCKS
+        own = (heights[number] > heights[0]) == (rise > 0.0)
+        owner[edge] = np.where(own, number, 0)[edge]
+    return owner
 
 
 def _block_medians(depth: FloatArray, step: int) -> FloatArray:
@@ -164,57 +172,12 @@ def _block_medians(depth: FloatArray, step: int) -> FloatArray:
     blocks = padded.reshape(ny, step, nx, step).transpose(0, 2, 1, 3)
     blocks = np.sort(blocks.reshape(ny, nx, -1), axis=2)  # NaN comes last.
     known = np.count_nonzero(np.isfinite(blocks), axis=2)
-    middle = np.maximum(known - 1, 0) // 2
-    medians: FloatArray = np.take_along_axis(blocks, middle[..., np.newaxis], axis=2)
-    return medians[..., 0]
+    # The mean of the two in the middle: the lower one alone sinks on a slope.
+    middle = [np.maximum(known - 1, 0) // 2, known // 2]
+    medians = np.take_along_axis(blocks, np.stack(middle, axis=-1), axis=2)
+    return np.asarray(medians.mean(axis=2))
 
 
 def _centres(count: int, cell: float) -> FloatArray:
     centres: FloatArray = (np.arange(count, dtype=np.float64) + 0.5) * cell
     return centres
-
-
-def _basis(at: FloatArray, x: FloatArray) -> FloatArray:
-    """Returns the cubic B-splines (n, k) at some places, on even knots that cover x."""
-    count = max(1, math.ceil((x[-1] - x[0]) / _KNOT))
-    width = max((x[-1] - x[0]) / count, 1e-9)
-    knots = x[0] + width * np.arange(-3, count + 4)
-    inside = np.clip(at, x[0], x[0] + count * width * (1.0 - 1e-12))
-    matrix: FloatArray = BSpline.design_matrix(inside, knots, 3).toarray()
-    return matrix
-
-
-class _Fit:
-    """Weighted, penalised least squares of tensor-product splines on a grid.
-
-    The normal matrix is built from the products of pairs of splines along each axis,
-    without ever forming the (cells x coefficients) matrix.
-    """
-
-    def __init__(self, along: FloatArray, across: FloatArray) -> None:
-        """Takes the splines along y, (ny, ky), and along x, (nx, kx)."""
-        self.along, self.across = along, across
-        ky, kx = along.shape[1], across.shape[1]
-        self._pairs_y = np.einsum("ia,ib->iab", along, along).reshape(-1, ky * ky)
-        self._pairs_x = np.einsum("ja,jb->jab", across, across).reshape(-1, kx * kx)
-        self._rough = np.kron(_roughness(ky), np.eye(kx))
-        self._rough += np.kron(np.eye(ky), _roughness(kx))
-
-    def solve(
-        self, weight: FloatArray, values: FloatArray, penalty: float
-    ) -> FloatArray:
-        """Returns the coefficients (ky, kx)."""
-        ky, kx = self.along.shape[1], self.across.shape[1]
-        normal = (self._pairs_y.T @ weight @ self._pairs_x).reshape(ky, ky, kx, kx)
-        normal = normal.transpose(0, 2, 1, 3).reshape(ky * kx, ky * kx)
-        right = (self.along.T @ (weight * values) @ self.across).ravel()
-        normal += penalty * self._rough + _RIDGE * np.eye(ky * kx)
-        solved: FloatArray = np.linalg.solve(normal, right)
-        return solved.reshape(ky, kx)
-
-
-def _roughness(count: int) -> FloatArray:
-    """Returns the matrix whose quadratic form sums squared third differences."""
-    differences = np.diff(np.eye(count), n=3, axis=0)
-    matrix: FloatArray = differences.T @ differences
-    return matrix
