@@ -16,8 +16,8 @@ from painter.config import load_scenario
 from painter.diagrams.paint_cycle import MakePaintCycle
 from painter.diagrams.true_wall import true_segmentation
 from painter.planning.remainder import Remainder
-from painter.systems.realsense_camera import RealsenseCamera
 from painter.systems.stage import Stage
+from tests.hil import Loop
 
 MARK = ".. pydrake_system::"
 # Bases that never stand in a diagram themselves.
@@ -66,16 +66,18 @@ def cycles():
     """Keeps the diagrams alive as long as their systems are looked at."""
     job = load_scenario("blank")
     known = Remainder(segmentation=true_segmentation(job), strokes=())
-    return MakePaintCycle(job), MakePaintCycle(job, remainder=known)
+    robot = Loop(job, world=False).bring_up().body(read_camera=Reading)
+    return (
+        MakePaintCycle(job),
+        MakePaintCycle(job, remainder=known),
+        MakePaintCycle(job, body=robot),
+    )
 
 
 @pytest.fixture(scope="module")
 def instances(cycles):
-    """The systems of whole paint cycles, and the robot's own, by class."""
-    size = {"width": 8, "height": 4, "color_width": 8, "color_height": 4}
-    robot = [RealsenseCamera(read=Reading, period=0.1, **size)]
-    found = [dut for cycle in cycles for dut in leaves(cycle.diagram)]
-    return {type(dut): dut for dut in [*found, *robot]}
+    """The systems of whole paint cycles by class."""
+    return {type(dut): dut for cycle in cycles for dut in leaves(cycle.diagram)}
 
 
 @pytest.mark.parametrize("kind", declared_classes(), ids=lambda kind: kind.__name__)

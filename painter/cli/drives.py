@@ -2,8 +2,9 @@
 
 import dataclasses
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,9 +13,12 @@ from painter.canopen.realtime import use_fifo
 from painter.canopen.sim.rack import Fault
 from painter.canopen.sim.server import RackServer
 from painter.canopen.units import AXES
-from painter.cli.common import JsonOption, print_result
+from painter.cli.common import JsonOption, SetOption, print_result
 from painter.errors import InputError
 from painter.resources import models_path
+
+if TYPE_CHECKING:
+    from painter.cli.hil_bench import HilBench
 
 # Below the bus process, which is at 60: real drives wait for no other program.
 _PRIORITY = 50
@@ -45,6 +49,31 @@ def drives(
             f"repeatable. Names: {', '.join(Fault)}.",
         ),
     ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Let the motors move the arm of this scenario before its scene, with "
+            "camera and paint.  [default: motors alone]",
+        ),
+    ] = None,
+    overrides: SetOption = None,
+    camera: Annotated[
+        str,
+        typer.Option(
+            metavar="PATH",
+            help="With --scenario: socket on which `painter deploy --camera` finds the "
+            "camera's pictures.",
+        ),
+    ] = "/tmp/painter-camera",
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN",
+            help="With --scenario: when the drives are switched off, add the film and "
+            "what is truly wall to this run of `painter deploy`.",
+        ),
+    ] = None,
     duration: Annotated[
         float | None,
         typer.Option(min=0.0, help="Time to run, s.  [default: until interrupted]"),
@@ -54,7 +83,13 @@ def drives(
     """Run simulated drives and the I/O node of a bus file on a CAN interface.
 
     They behave like real ones down to their faults, and take the time of a real bus.
+
+    Raises:
+        InputError: An option is wrong.
+        PainterError: The simulated world has ended.
     """
+    if scenario is None and (overrides or truth is not None):
+        raise InputError("--set and --truth: go with --scenario alone.")
     bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
     bus = dataclasses.replace(
         bus,
@@ -62,7 +97,10 @@ def drives(
         channel=channel or bus.channel,
     )
     plan = sorted((_fault(word) for word in faults or ()), key=lambda item: item[0])
-    server = RackServer(bus)
+    bench = None if scenario is None else _bench(scenario, overrides or (), camera)
+    server = RackServer(bus, None if bench is None else bench.load)
+    if bench is not None:
+        bench.attach(server)
     use_fifo(_PRIORITY)
     typer.echo(f"drives are on {bus.interface} {bus.channel}", err=True)
 
@@ -80,6 +118,8 @@ def drives(
     finally:
         server.close()
     rack = server.rack
+    if bench is not None:
+        bench.finish(truth)
     figures: dict[str, object] = {
         "time_s": rack.now,
         "frames": rack.wire.frame_count,
@@ -88,6 +128,14 @@ def drives(
     }
     figures |= {f"{name}_state": d.state.value for name, d in rack.drives.items()}
     print_result(figures, as_json=as_json)
+
+
+def _bench(scenario: str, overrides: Sequence[str], camera: str) -> "HilBench":
+    # Drake is imported only for drives that move an arm.
+    from painter.cli.hil_bench import HilBench
+    from painter.config import load_scenario
+
+    return HilBench(load_scenario(scenario, overrides), camera=camera)
 
 
 def _fault(word: str) -> tuple[float, Fault, str]:

@@ -23,6 +23,7 @@ COMMANDS = {
     "map": "Map a recorded RGB-D sequence: poses and one surface.",
     "plan": "Plan the paint program of a segmented wall.",
     "place": "Propose where the base stands to paint a tile or a wall.",
+    "deploy": "Paint with the robot, over its CAN bus.",
     "drives": "Run simulated CiA 402 drives on a CAN interface.",
     "canlog": "Show a log of the bus in CiA 402 words.",
     "report": "Rebuild the report page of a run.",

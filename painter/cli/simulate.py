@@ -8,34 +8,21 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from PIL import Image
 from pydrake.geometry import Meshcat
 
 from painter.cli.common import JsonOption, SetOption, print_result, progress
 from painter.cli.earlier_run import EarlierRun
-from painter.config import Scenario, dump_scenario, load_scenario
-from painter.diagrams.simulation import (
-    CycleLog,
-    SimulateCycle,
-    Watch,
-    clearance_violations,
-)
+from painter.cli.run_log import event_watch, print_summary, write_log
+from painter.config import dump_scenario, load_scenario
+from painter.diagrams.simulation import SimulateCycle, Watch
 from painter.errors import FaultError, InputError
 from painter.planning.stroke_lines import nominal_pitch
-from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
-from painter.run.film_preview import run_preview
-from painter.run.folder import LOOK, SCENE, RunFolder
+from painter.run.folder import SCENE, RunFolder
 from painter.run.replay import add_paint, set_view
 from painter.run.report import finish_run
-from painter.run.values import Executed, Film, Truth
 from painter.scene.load import load_scene
-from painter.scene.sdf import wall_pose
-from painter.scene.surface import height_field, is_paintable, surface_at
-from painter.systems.paint_film import FilmState
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 
-# How much nearer than planned the robot may come: tracking and the map's own error.
-CLEARANCE_TOLERANCE = 0.02
 REPLAY_RATE = 10.0  # Pictures a second of robot time.
 VERSIONS = ("painter", "drake", "numpy", "scipy", "open3d")
 
@@ -154,7 +141,7 @@ def simulate(
     if as_json:
         print_result(figures, as_json=True)
     else:
-        _print_summary(figures, out)
+        print_summary(figures, out)
     if log.status.phase != Phase.DONE:
         raise FaultError(f"{log.status.phase.value}: {log.status.cause}")
 
@@ -184,137 +171,17 @@ def _earlier(
     return EarlierRun.to_touch_up(run, words, clear)
 
 
-def write_log(
-    folder: RunFolder,
-    scenario: Scenario,
-    log: CycleLog,
-    *,
-    before: FilmState | None = None,
-) -> None:
-    """Writes what a simulated cycle left, with the truth of its scene.
-
-    Args:
-        folder: The run's folder; its event log holds the cycle's events already.
-        scenario: The job.
-        log: What it left.
-        before: Film that was there before it; None = none.
-    """
-    for distances, planned in (
-        (log.clearance, scenario.motion.clearance),
-        (log.floor_clearance, scenario.motion.floor_clearance),
-    ):
-        bound = max(planned - CLEARANCE_TOLERANCE, 0.0)
-        for when, distance in clearance_violations(
-            log.clearance_time, distances, bound
-        ):
-            folder.log(when, "collision", distance_m=distance, bound_m=bound)
-    folder.save_map(log.surface_map)
-    folder.save_executed(
-        Executed(
-            time=log.time,
-            q=log.q,
-            v=log.v,
-            trigger=log.trigger,
-            X_WG=log.X_WG,
-            X_WG_desired=log.X_WG_desired,
-        )
-    )
-    if log.look_image is not None:
-        Image.fromarray(log.look_image[:, :, :3]).save(folder.path / LOOK)
-    if log.segmentation is None:
-        return
-    folder.save_segmentation(log.segmentation)
-    scene = load_scene(scenario.scene, scenario.random_seed)
-    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
-    X_ST = X_WS.inverse() @ log.segmentation.X_WT
-    ny, nx = log.segmentation.labels.shape
-    x, y = cell_centres((ny, nx), log.segmentation.cell)
-    p_SQs = X_ST @ grid_points(x, y)
-    _, kind = surface_at(scene, p_SQs[0], p_SQs[1])
-    folder.save_truth(
-        Truth(
-            wall_mask=is_paintable(kind).reshape(ny, nx),
-            X_WS=X_WS,
-            source=(
-                "Ray casting against the scene's geometry, at the centres of the "
-                "robot's own grid cells carried into the scene by its true pose."
-            ),
-        )
-    )
-    surface = height_field(
-        scene,
-        cell=log.film.cell,
-        margin=-float(log.film.origin[0]),
-        width=scenario.tile.width,
-        height=scenario.tile.height,
-    )
-    folder.save_film(
-        Film.on_tile(
-            thickness=log.film.thickness,
-            kind=surface.kind,
-            paintable=is_paintable(surface.kind),
-            cell=surface.cell,
-            x0=float(surface.origin[0]),
-            y0=float(surface.origin[1]),
-            X_ST=X_ST,
-            tile_size=(scenario.tile.width, scenario.tile.height),
-            sprayed=log.film.sprayed,
-            landed=log.film.landed,
-            missed=log.film.missed,
-            before=None if before is None else before.thickness,
-        )
-    )
-    if log.program is not None:
-        preview = run_preview(folder, log.program, folder.scenario())
-        folder.save_program(log.program, preview)
-
-
 def _watch(
     folder: RunFolder, show: Callable[[float, str], None], stop_at: float | None
 ) -> Watch:
-    """Returns a watcher that logs each event once and moves the progress bar.
-
-    It aborts where `stop_at`, the number of a stroke, is reached.
-    """
-    logged = 0
-    phases = list(Phase)
-    last = phases.index(Phase.DONE)
+    """Returns a watcher that aborts where `stop_at`, a stroke's number, is reached."""
+    tell = event_watch(folder, show)
 
     def watch(now: float, status: CycleStatus, follower: FollowerStatus) -> str | None:
-        nonlocal logged
-        for when, name, data in status.events[logged:]:
-            folder.log(when, name, **data)
-        logged = len(status.events)
-        text = f"{status.phase.value.lower()}, robot time {now:.0f} s"
-        # Painting takes most of the time of a cycle.
-        index = min(phases.index(status.phase), last)
-        share = 0.4 * index / last
-        if status.phase == Phase.PAINT and follower.duration > 0.0:
-            share += 0.5 * follower.position / follower.duration
-        elif index > phases.index(Phase.PAINT):
-            share = 1.0
-        show(share, text)
+        tell(now, status, follower)
         painting = status.phase == Phase.PAINT
         if stop_at is not None and painting and status.next_stroke >= stop_at:
             return "abort"
         return None
 
     return watch
-
-
-def _print_summary(figures: dict, out: Path) -> None:
-    names = (
-        "result",
-        "motion_time_s",
-        "mask_iou",
-        "coverage",
-        "thickness_cv_interior",
-        "overspray",
-        "keepout_paint",
-        "collisions",
-    )
-    summary = {name: figures[name] for name in names if figures.get(name) is not None}
-    summary |= {
-        name: figures["timing"][name] for name in ("cycle_time_s", "wall_clock_s")
-    }
-    print_result(summary | {"report": str(out / "report.html")}, as_json=False)

@@ -1,7 +1,7 @@
 """The brain, and the whole paint cycle: a station with the brain."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -29,6 +29,9 @@ from painter.systems.wall_finder import WallFinder
 from painter.systems.wall_segmenter import WallSegmenter
 from perception.depth import CameraIntrinsics
 from perception.values import Wall
+
+if TYPE_CHECKING:  # Simulation runs without the robot's packages.
+    from painter.diagrams.hardware_station import Body
 
 # Inputs and outputs of the brain that meet the station's ports of the same name.
 STATION_TO_BRAIN = (
@@ -221,6 +224,7 @@ class PaintCycleDiagram:
 def MakePaintCycle(
     scenario: Scenario,
     *,
+    body: "Body | None" = None,
     remainder: Remainder | None = None,
     film: FilmState | None = None,
     meshcat: Meshcat | None = None,
@@ -229,12 +233,15 @@ def MakePaintCycle(
 
     Args:
         scenario: The job.
+        body: What the robot's station is connected to; None = a simulated one.
         remainder: See `MakeBrain`.
         film: What is on the wall already; simulation only. None = nothing.
         meshcat: Where to show it, or None.
     """
     builder = DiagramBuilder()
-    station = builder.AddSystem(MakeStation(scenario, film=film, meshcat=meshcat))
+    station = builder.AddSystem(
+        MakeStation(scenario, body=body, film=film, meshcat=meshcat)
+    )
     brain = builder.AddSystem(MakeBrain(scenario, remainder=remainder))
     for name in STATION_TO_BRAIN:
         builder.Connect(station.GetOutputPort(name), brain.GetInputPort(name))

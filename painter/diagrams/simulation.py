@@ -39,7 +39,7 @@ Watch = Callable[[float, CycleStatus, FollowerStatus], str | None]
 
 @dataclass(frozen=True, eq=False)
 class CycleLog(FrozenValue):
-    """What a simulated cycle leaves; parts it did not come to are None.
+    """What a cycle leaves; parts it did not come to are None.
 
     Attributes:
         status: The cycle's last status, with all events.
@@ -48,15 +48,15 @@ class CycleLog(FrozenValue):
         q: (n, 5) rad, measured.
         v: (n, 5) rad/s, measured.
         trigger: (n,) as the gun received it.
-        X_WG: (n, 4, 4) true nozzle poses in W.
+        X_WG: (n, 4, 4) nozzle poses in W: true ones, or measured where nobody knows.
         X_WG_desired: (n, 4, 4) nozzle poses of the desired joint state.
-        clearance_time: (k,) s.
+        clearance_time: (k,) s; nothing where nobody knows clearances.
         clearance: (k,) m, least distance of the robot from the scene.
         floor_clearance: (k,) m, the same from the floor and the robot's own frame.
         surface_map: The fused map.
         segmentation: The wall's segmentation, or None.
         program: The paint program, or None.
-        film: The paint film at the end.
+        film: The paint film at the end; None where nobody knows it.
         look_image: (H, W, 4) uint8, colour picture of first sight, or None.
     """
 
@@ -74,7 +74,7 @@ class CycleLog(FrozenValue):
     surface_map: SurfaceMap
     segmentation: WallSegmentation | None
     program: PaintProgram | None
-    film: FilmState
+    film: FilmState | None
     look_image: npt.NDArray[np.uint8] | None
 
 
@@ -124,9 +124,9 @@ def SimulateCycle(
     look_image = None
     while True:
         simulator.AdvanceTo(context.get_time() + WATCH_PERIOD)
-        status: CycleStatus = _Evaluate(cycle, context, "cycle_status")
+        status: CycleStatus = Evaluate(cycle, context, "cycle_status")
         if watch is not None:
-            follower = _Evaluate(cycle, context, "follower_status")
+            follower = Evaluate(cycle, context, "follower_status")
             word = watch(context.get_time(), status, follower)
             if word is not None:
                 said = OperatorCommand(number=said.number + 1, word=word)
@@ -138,13 +138,14 @@ def SimulateCycle(
     return _MakeLog(scenario, cycle, context, sinks, status, look_image)
 
 
-def _Evaluate(cycle: PaintCycleDiagram, context: Context, port: str) -> Any:
+def Evaluate(cycle: PaintCycleDiagram, context: Context, port: str) -> Any:
+    """Returns an output of the cycle's diagram, in a context of its root."""
     own = cycle.diagram.GetMyContextFromRoot(context)
     return cycle.diagram.GetOutputPort(port).Eval(own)
 
 
 def _ColorImage(cycle: PaintCycleDiagram, context: Context) -> npt.NDArray[np.uint8]:
-    return _Evaluate(cycle, context, "wall_camera.color_image").data.copy()
+    return Evaluate(cycle, context, "wall_camera.color_image").data.copy()
 
 
 def _MakeLog(
@@ -158,8 +159,8 @@ def _MakeLog(
     logs = {name: sink.FindLog(context) for name, sink in sinks.items()}
     data = {name: log.data().copy() for name, log in logs.items()}
     kinematics = GetArmKinematics(MakeArmPlant(scenario.directives))
-    segmentation: StageResult = _Evaluate(cycle, context, "segmentation")
-    program: StageResult = _Evaluate(cycle, context, "program")
+    segmentation: StageResult = Evaluate(cycle, context, "segmentation")
+    program: StageResult = Evaluate(cycle, context, "program")
     return CycleLog(
         status=status,
         end_time=context.get_time(),
@@ -167,20 +168,21 @@ def _MakeLog(
         q=data["measured"][:NQ].T.copy(),
         v=data["measured"][NQ:].T.copy(),
         trigger=data["trigger"][0].copy(),
-        X_WG=_GunPoses(kinematics, data["state"][:NQ].T),
-        X_WG_desired=_GunPoses(kinematics, data["desired"][:NQ].T),
+        X_WG=GunPoses(kinematics, data["state"][:NQ].T),
+        X_WG_desired=GunPoses(kinematics, data["desired"][:NQ].T),
         clearance_time=logs["clearance"].sample_times().copy(),
         clearance=data["clearance"][0].copy(),
         floor_clearance=data["floor_clearance"][0].copy(),
-        surface_map=_Evaluate(cycle, context, "surface_map"),
+        surface_map=Evaluate(cycle, context, "surface_map"),
         segmentation=segmentation.value,
         program=program.value,
-        film=_Evaluate(cycle, context, "cheat.film"),
+        film=Evaluate(cycle, context, "cheat.film"),
         look_image=look_image,
     )
 
 
-def _GunPoses(kinematics: ArmKinematics, q: FloatArray) -> FloatArray:
+def GunPoses(kinematics: ArmKinematics, q: FloatArray) -> FloatArray:
+    """Returns (n, 4, 4) nozzle poses in W of joint positions (n, 5), rad."""
     R_WG, p_WG = kinematics.gun_poses(q)
     poses = np.tile(np.eye(4), (len(q), 1, 1))
     poses[:, :3, :3] = R_WG

@@ -1,11 +1,16 @@
 """The station: what the brain sees of a body, whichever body it is."""
 
+from typing import TYPE_CHECKING
+
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram
 
 from painter.config import Scenario
 from painter.diagrams.sim_station import MakeSimStation
 from painter.systems.paint_film import FilmState
+
+if TYPE_CHECKING:  # Simulation runs without the robot's packages.
+    from painter.diagrams.hardware_station import Body
 
 STATION_INPUTS = frozenset({"arm.desired_state", "gun.trigger"})
 STATION_OUTPUTS = frozenset(
@@ -23,20 +28,30 @@ CHEAT_PREFIX = "cheat."
 def MakeStation(
     scenario: Scenario,
     *,
+    body: "Body | None" = None,
     film: FilmState | None = None,
     meshcat: Meshcat | None = None,
 ) -> Diagram:
-    """Makes the simulated station.
+    """Makes the simulated station or, given a connected `body`, the robot's.
 
     Args:
         scenario: What stands in front of which robot.
-        film: What is on the wall already; None = nothing.
-        meshcat: Where to show it, or None.
+        body: What the robot's station is connected to; None = a simulated one.
+        film: What is on the wall already; simulation only. None = nothing.
+        meshcat: Where to show it; simulation only. None = nowhere.
 
     Returns:
-        A diagram with exactly the ports of the contract, plus `cheat.*`.
+        A diagram with exactly the ports of the contract; in simulation, plus `cheat.*`.
+
+    Raises:
+        BusError: The robot's drives are not enabled.
     """
-    station = MakeSimStation(scenario, film=film, meshcat=meshcat)
+    if body is None:
+        station = MakeSimStation(scenario, film=film, meshcat=meshcat)
+    else:
+        from painter.diagrams.hardware_station import MakeHardwareStation
+
+        station = MakeHardwareStation(scenario, body)
     CheckPorts(station)
     return station
 

@@ -91,20 +91,34 @@ class ZoneConfig:
     kind: str = "exclude"
     corners: list[list[float]] = dataclasses.field(default_factory=list)
 
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
+    def validate(self, name: str) -> None:
+        """Raises ValueError for a value out of bounds; `name` is the zone's."""
         if self.kind not in ("exclude", "include"):
             raise ValueError(
-                f'raster.zones: kind must be "exclude" or "include", got {self.kind!r}.'
+                f'{name}.kind must be "exclude" or "include", got {self.kind!r}.'
             )
         if len(self.corners) < 2 or not all(
             len(corner) == 2 and all(math.isfinite(value) for value in corner)
             for corner in self.corners
         ):
             raise ValueError(
-                "raster.zones: corners must be two or more pairs x, y, got "
-                f"{self.corners!r}."
+                f"{name}.corners must be two or more pairs x, y, got {self.corners!r}."
             )
+        x, y = zip(*self.corners, strict=True)
+        if max(x) - min(x) <= 0.0 or max(y) - min(y) <= 0.0:
+            raise ValueError(
+                f"{name}.corners must enclose more than 0 m², got {self.corners!r}."
+            )
+
+    def require_on(self, width: float, height: float, name: str) -> None:
+        """Raises ValueError for a corner that is not on a tile or wall, m."""
+        for x, y in self.corners:
+            for axis, value, bound in (("x", x, width), ("y", y, height)):
+                if not 0.0 <= value <= bound:
+                    raise ValueError(
+                        f"{name}.corners: {axis} must be 0 to {bound:g} m, got "
+                        f"{value!r}."
+                    )
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -150,8 +164,8 @@ class RasterConfig:
                 "horizontal, fixed by how the gun is bolted on, and an arm of five "
                 f"joints cannot roll it; got {self.direction!r}."
             )
-        for zone in self.zones:
-            zone.validate()
+        for number, zone in enumerate(self.zones):
+            zone.validate(f"raster.zones[{number}]")
         if not 0.08 <= self.cut_in_standoff < 1.0:
             raise ValueError(
                 "raster.cut_in_standoff must be 0.08 to 1 m, got "

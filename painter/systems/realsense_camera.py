@@ -71,6 +71,7 @@ class RealsenseCamera(LeafSystem):
         color_width: int,
         color_height: int,
         period: float,
+        diagram_time: Callable[[float], float] | None = None,
     ) -> None:
         """Creates the system.
 
@@ -81,6 +82,8 @@ class RealsenseCamera(LeafSystem):
             color_width: Of colour pictures on the port, px; others are not shown.
             color_height: Of colour pictures on the port, px.
             period: Time between looks for a new picture, s.
+            diagram_time: Maps this computer's clock, s, to the diagram's, s; None takes
+                the diagram to be at now.
 
         Raises:
             ValueError: `period` is not a positive number.
@@ -89,6 +92,7 @@ class RealsenseCamera(LeafSystem):
         if not (np.isfinite(period) and period > 0.0):
             raise ValueError(f"period must be > 0 s, got {period!r}.")
         self._read = read
+        self._diagram_time = diagram_time
         self._color_shape = (color_height, color_width, 3)
         # State.
         self._picture_index = self.DeclareAbstractState(Value(CameraPicture()))
@@ -155,9 +159,14 @@ class RealsenseCamera(LeafSystem):
             return EventStatus.DidNothing()
         picture = last.replace(health=reading.health)
         if reading.frame is not None and reading.frame is not last.frame:
-            taken = context.get_time() - (time.monotonic() - reading.taken)
-            # Taken before the diagram's time began: not a picture of this run.
-            if taken >= 0.0 and taken > last.time:
+            now = context.get_time()
+            if self._diagram_time is None:
+                taken = now - (time.monotonic() - reading.taken)
+            else:
+                taken = self._diagram_time(reading.taken)
+            # Taken before the diagram's time began: not a picture of this run; or after
+            # where the diagram is: it will be in time at the next look.
+            if 0.0 <= taken <= now and taken > last.time:
                 picture = picture.replace(frame=reading.frame, time=taken)
         index = int(self._picture_index)
         state.get_mutable_abstract_state(index).set_value(picture)

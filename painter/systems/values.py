@@ -42,15 +42,23 @@ class DriveStatus(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class ArmStatus(FrozenValue):
-    """State of the arm's five drives, base yaw first."""
+    """State of the arm's five drives, base yaw first.
+
+    Attributes:
+        drives: State of each.
+        stopped: Why the body has stopped the arm by itself, in a line; else empty.
+    """
 
     drives: tuple[DriveStatus, ...] = field(
         default_factory=lambda: (DriveStatus(),) * 5
     )
+    stopped: str = ""
 
     @property
     def fault(self) -> str | None:
-        """Names the first drive that is not operational, or None."""
+        """Says why the body stopped, or names the first drive that failed, or None."""
+        if self.stopped:
+            return self.stopped
         for number, drive in enumerate(self.drives, start=1):
             if drive.fault_code or drive.state != "OPERATION ENABLED":
                 code = f"0x{drive.fault_code:04X}"

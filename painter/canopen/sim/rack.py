@@ -2,6 +2,7 @@
 
 import enum
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -65,6 +66,8 @@ class Rack:
         self.io = SimIo(bus.io.node_id, self.wire)
         self.link = WireLink(self)
         self.now = 0.0
+        # Called after each step of 1 ms.
+        self.stepped: Callable[[], None] = lambda: None
         self._load = load
         if load is not None:
             self._motors = [LoadedMotor() for _ in AXES]
@@ -89,6 +92,7 @@ class Rack:
                 node.step(self.now)
             if self._load is not None:
                 self._move(self._load)
+            self.stepped()
         self.wire.advance(until)
 
     def _move(self, load: Load) -> None:

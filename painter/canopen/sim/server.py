@@ -12,6 +12,7 @@ from painter.canopen.bus_config import BusConfig
 from painter.canopen.frames import Frame
 from painter.canopen.links import Link, LinkError, open_link, pack_frame, unpack_frame
 from painter.canopen.realtime import settle_memory
+from painter.canopen.sim.load import Load
 from painter.canopen.sim.rack import STEP, Rack
 
 _MOST_BEHIND = 0.1
@@ -103,13 +104,17 @@ class RackServer:
     charges is what a real bus would.
     """
 
-    def __init__(self, bus: BusConfig) -> None:
+    def __init__(self, bus: BusConfig, load: Load | None = None) -> None:
         """Opens the link of the bus file ("local" listens) and powers the rack.
+
+        Args:
+            bus: What is on the bus.
+            load: What the motors move; see `Rack`.
 
         Raises:
             LinkError: The link cannot be opened.
         """
-        self.rack = Rack(bus)
+        self.rack = Rack(bus, load)
         self._link: Link = (
             LocalHub(bus.channel) if bus.interface == "local" else open_link(bus)
         )
@@ -122,6 +127,10 @@ class RackServer:
         settle_memory()
         while not is_done(self.rack.now):
             self._serve(self._now())
+
+    def monotonic(self) -> float:
+        """Returns the rack's present time by `time.monotonic()`, s."""
+        return self._start + self.rack.now
 
     def close(self) -> None:
         """Gives the link up."""

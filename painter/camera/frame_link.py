@@ -1,0 +1,146 @@
+"""Pictures from one process to another over a local socket.
+
+`FrameServer` stands beside a renderer or player, `FrameLink` is a `FrameSource` on the
+other side, such as librealsense's software device is fed from.
+"""
+
+import contextlib
+import select
+import socket
+import struct
+import time
+from pathlib import Path
+
+import numpy as np
+
+from painter.camera.frames import CameraError, ColorArray, DepthArray
+
+_HEAD = struct.Struct("<4sdHHB")
+_MAGIC = b"pic1"
+_SEND_TIME = 1.0
+_RECEIVE_TIME = 2.0
+
+
+class FrameServer:
+    """Sends pictures to all who are connected."""
+
+    def __init__(self, path: str) -> None:
+        """Listens.
+
+        Raises:
+            CameraError: The path cannot be used.
+        """
+        self._path = Path(path)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            if self._path.is_socket():
+                self._path.unlink()
+            self._listener.bind(path)
+        except OSError as error:
+            self._listener.close()
+            raise CameraError(f"camera socket {path}: {error.strerror}.") from error
+        self._listener.listen()
+        self._clients: list[socket.socket] = []
+
+    def send(self, depth_mm: DepthArray, color: ColorArray | None, when: float) -> None:
+        """Sends a picture; who does not read is disconnected.
+
+        Args:
+            depth_mm: (H, W) uint16, mm.
+            color: (H, W, 3) RGB, or None.
+            when: When it was taken, by `time.monotonic()`, s.
+        """
+        while select.select([self._listener], [], [], 0.0)[0]:
+            client, _ = self._listener.accept()
+            client.settimeout(_SEND_TIME)
+            self._clients.append(client)
+        height, width = depth_mm.shape
+        data = _HEAD.pack(_MAGIC, when, height, width, color is not None)
+        data += np.ascontiguousarray(depth_mm, dtype="<u2").tobytes()
+        if color is not None:
+            data += np.ascontiguousarray(color, dtype=np.uint8).tobytes()
+        for client in list(self._clients):
+            try:
+                client.sendall(data)
+            except OSError:
+                self._clients.remove(client)
+                client.close()
+
+    def close(self) -> None:
+        """Disconnects all and removes the socket."""
+        for client in self._clients:
+            client.close()
+        self._listener.close()
+        with contextlib.suppress(FileNotFoundError):
+            self._path.unlink()
+
+
+class FrameLink:
+    """Pictures of a `FrameServer`; a `FrameSource`.
+
+    Every picture is handed on when it is `latency` old, as those of a camera are, so
+    that what took long to render comes no later than the rest.
+    """
+
+    def __init__(self, path: str, *, latency: float) -> None:
+        """Names the server; it is connected to when a picture is asked for.
+
+        Args:
+            path: Of the server's socket.
+            latency: Age at which pictures are handed on, s.
+        """
+        self._path = path
+        self._latency = latency
+        self._socket: socket.socket | None = None
+
+    def wait_frame(
+        self, timeout: float
+    ) -> tuple[DepthArray, ColorArray | None, float] | None:
+        """See `FrameSource`."""
+        try:
+            link = self._connected()
+            if not select.select([link], [], [], timeout)[0]:
+                return None
+            magic, when, height, width, has_color = _HEAD.unpack(self._read(_HEAD.size))
+            if magic != _MAGIC:
+                raise ConnectionError("not a picture")
+            depth = np.frombuffer(self._read(2 * height * width), "<u2")
+            color = None
+            if has_color:
+                color = np.frombuffer(self._read(3 * height * width), np.uint8)
+                color = color.reshape(height, width, 3)
+        except OSError as error:
+            self.close()
+            text = error.strerror or str(error)
+            raise CameraError(f"camera socket {self._path}: {text}.") from error
+        time.sleep(max(0.0, when + self._latency - time.monotonic()))
+        return depth.reshape(height, width).astype(np.uint16), color, when
+
+    def close(self) -> None:
+        """Disconnects."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _connected(self) -> socket.socket:
+        if self._socket is None:
+            link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            try:
+                link.connect(self._path)
+            except OSError:
+                link.close()
+                raise
+            link.settimeout(_RECEIVE_TIME)
+            self._socket = link
+        return self._socket
+
+    def _read(self, size: int) -> bytearray:
+        assert self._socket is not None
+        data, got = bytearray(size), 0
+        view = memoryview(data)
+        while got < size:
+            count = self._socket.recv_into(view[got:])
+            if count == 0:
+                raise ConnectionResetError(104, "the other side closed")
+            got += count
+        return data

@@ -1,0 +1,106 @@
+"""Master and simulated drives in one thread and in simulated time; a `Bus`.
+
+Nothing waits: time goes on only in `wait_until`. So a whole cycle over CAN frames, and
+every fault in it, repeats exactly.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from painter.canopen.arm_bus import ArmBus
+from painter.canopen.bus_process import Report
+from painter.canopen.feedback import Phase
+from painter.canopen.sample_ring import Samples
+from painter.canopen.setpoints import Setpoint
+from painter.canopen.sim.rack import STEP, Rack
+from painter.canopen.units import FloatArray
+from painter.errors import BusError
+
+_KEPT = 2048
+_SWITCH_OFF_TIME = 5.0
+
+
+class LockstepBus:
+    """A master that is stepped together with its drives.
+
+    Attributes:
+        rack: The drives.
+        master: The master; None once it was killed.
+    """
+
+    def __init__(self, rack: Rack) -> None:
+        """Puts a master on a rack's wire."""
+        self.rack = rack
+        self._bus = rack.bus
+        self.master: ArmBus | None = ArmBus(rack.bus, rack.link)
+        self.master.measured = self._note
+        self._steps = 0
+        self._per_cycle = round(rack.bus.cycle / STEP)
+        self._rows: deque[FloatArray] = deque(maxlen=_KEPT)
+
+    def start(self) -> None:
+        """Begins bring-up."""
+        self._alive().start()
+
+    def push(self, points: list[Setpoint]) -> None:
+        """Hands setpoints over."""
+        self._alive().push(points)
+
+    def stop(self, reason: str) -> None:
+        """Stops the arm."""
+        self._alive().stop(reason)
+
+    def acknowledge(self) -> None:
+        """Begins again after a stop."""
+        self._alive().acknowledge()
+
+    def report(self) -> Report:
+        """Returns the master's report."""
+        return Report(self._alive().feedback())
+
+    def samples(self, since: float) -> Samples:
+        """Returns what was measured after a time, s."""
+        rows = np.array(self._rows).reshape(-1, 12)
+        rows = rows[np.searchsorted(rows[:, 0], since, side="right") :]
+        return Samples(rows[:, 0], rows[:, 1:6], rows[:, 6:11], rows[:, 11])
+
+    def now(self) -> float:
+        """Returns the simulated time, s."""
+        return self._steps * STEP
+
+    def wait_until(self, when: float) -> None:
+        """Lets time pass."""
+        while self._steps * STEP < when - 1e-9:
+            self._step()
+
+    def kill(self) -> None:
+        """Ends the master as a killed process does: it is called no more."""
+        self.master = None
+
+    def close(self) -> None:
+        """Switches the arm off."""
+        if self.master is None:
+            return
+        self.master.shut_down()
+        end = self.now() + _SWITCH_OFF_TIME
+        while self.master.phase != Phase.DOWN and self.now() < end:
+            self._step()
+
+    def _step(self) -> None:
+        now = self.now()
+        if self.master is not None:
+            if self._steps % self._per_cycle == 0:
+                self.master.cycle(now)
+            else:
+                self.master.poll(now)
+        self._steps += 1
+        self.rack.advance(self.now())
+
+    def _alive(self) -> ArmBus:
+        if self.master is None:
+            raise BusError("the bus process has ended: killed.")
+        return self.master
+
+    def _note(self, time: float, q: FloatArray, v: FloatArray, trigger: float) -> None:
+        self._rows.append(np.concatenate([[time], q, v, [trigger]]))

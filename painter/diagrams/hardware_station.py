@@ -1,0 +1,79 @@
+"""The robot's body: CANopen drives and gun, and a depth camera."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from painter.camera.reader import Reading
+from painter.canopen.robot_clock import Bus, RobotClock
+from painter.config import Scenario
+from painter.systems.canopen_arm import CanopenArm
+from painter.systems.realsense_camera import RealsenseCamera
+
+# Time between looks for a new picture, s; a camera takes 30 a second at most.
+CAMERA_PERIOD = 0.02
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a hardware station is connected to.
+
+    Attributes:
+        bus: With its drives enabled.
+        clock: The diagram's time on it.
+        cycle: Time between two SYNCs, s.
+        read_camera: Returns the newest of the camera without waiting.
+        gun_off: Whether the gun stays closed, whatever the brain says.
+    """
+
+    bus: Bus
+    clock: RobotClock
+    cycle: float
+    read_camera: Callable[[], Reading]
+    gun_off: bool = False
+
+
+def MakeHardwareStation(scenario: Scenario, body: Body) -> Diagram:
+    """Makes the robot's station.
+
+    Args:
+        scenario: Sizes of the camera's pictures.
+        body: What it is connected to.
+
+    Returns:
+        A diagram with the ports of `painter.diagrams.station`.
+
+    Raises:
+        BusError: The bus has ended, or its drives are not enabled.
+    """
+    builder = DiagramBuilder()
+    config = scenario.wall_camera
+    arm = builder.AddNamedSystem(
+        "canopen_arm",
+        CanopenArm(
+            bus=body.bus, clock=body.clock, period=body.cycle, gun_off=body.gun_off
+        ),
+    )
+    camera = builder.AddNamedSystem(
+        "realsense_camera",
+        RealsenseCamera(
+            read=body.read_camera,
+            width=config.stereo.width,
+            height=config.stereo.height,
+            color_width=config.color_width,
+            color_height=config.color_height,
+            period=CAMERA_PERIOD,
+            diagram_time=body.clock.diagram_time,
+        ),
+    )
+    builder.Connect(camera.GetOutputPort("status"), arm.GetInputPort("camera_status"))
+    builder.ExportInput(arm.GetInputPort("desired_state"), "arm.desired_state")
+    builder.ExportInput(arm.GetInputPort("trigger"), "gun.trigger")
+    builder.ExportOutput(arm.GetOutputPort("state_estimated"), "arm.state_estimated")
+    builder.ExportOutput(arm.GetOutputPort("status"), "arm.status")
+    for port in ("color_image", "depth_image", "image_time"):
+        builder.ExportOutput(camera.GetOutputPort(port), f"wall_camera.{port}")
+    diagram = builder.Build()
+    diagram.set_name("station")
+    return diagram
