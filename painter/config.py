@@ -167,6 +167,10 @@ class Scenario:
         for name in ("mount_error_m", "mount_error_deg"):
             if len(getattr(self.wall_camera, name)) != 3:
                 raise ValueError(f"wall_camera.{name} must have 3 numbers.")
+        for number, zone in enumerate(self.raster.zones):
+            name = f"raster.zones[{number}]"
+            zone.validate(name)
+            zone.require_on(self.tile.width, self.tile.height, name)
         for part in (
             self.wall_camera.stereo,
             self.wall_camera.driver,

@@ -3,7 +3,7 @@
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from painter.errors import InputError
+from painter.planning.config import ZoneConfig
 
 SetOption = Annotated[
     list[str] | None,
@@ -44,6 +45,56 @@ def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
     for name, value in result.items():
         text = f"{value:.4g}" if isinstance(value, float) else str(value)
         typer.echo(f"{name:<{width}}  {text}")
+
+
+IncludeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--include",
+        metavar="X,Y,X,Y...",
+        help="Paint only inside such zones: two opposite corners of a rectangle or the "
+        "corners of a polygon, m from the lower left corner; repeatable.",
+    ),
+]
+ExcludeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--exclude",
+        metavar="X,Y,X,Y...",
+        help="Leave this zone clean; given as for --include; repeatable.",
+    ),
+]
+
+
+def operator_zones(
+    include: Sequence[str] | None,
+    exclude: Sequence[str] | None,
+    width: float,
+    height: float,
+) -> list[ZoneConfig]:
+    """Reads the zones of --include and --exclude.
+
+    Args:
+        include: Words of --include.
+        exclude: Words of --exclude.
+        width: Of the tile or wall that they are on, m.
+        height: Of the same, m.
+
+    Raises:
+        InputError: A zone is none, or not on the tile; names option, value and bound.
+    """
+    zones = []
+    for kind, words in (("include", include), ("exclude", exclude)):
+        for word in words or ():
+            name = f"--{kind} {word!r}"
+            zone = ZoneConfig(kind=kind, corners=mark_corners(f"--{kind}", word))
+            try:
+                zone.validate(name)
+                zone.require_on(width, height, name)
+            except ValueError as error:
+                raise InputError(str(error)) from error
+            zones.append(zone)
+    return zones
 
 
 def mark_corners(option: str, word: str) -> list[list[float]]:

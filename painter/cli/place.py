@@ -8,17 +8,23 @@ import numpy as np
 import typer
 
 from painter.cli.common import (
+    ExcludeOption,
+    IncludeOption,
     JsonOption,
     OutOption,
     SetOption,
+    operator_zones,
     output_folder,
     print_result,
 )
 from painter.config import load_scenario
 from painter.diagrams.reach_map import ReachMapper
 from painter.errors import InputError
+from painter.planning.config import ZoneConfig
 from painter.planning.facade import plan_stations
 from painter.planning.placement import propose_distance
+from painter.scene.config import Scene
+from painter.scene.load import load_scene
 
 STATIONS_FILE = "stations.json"
 _DISTANCES = np.round(np.arange(0.80, 1.46, 0.05), 3)  # m
@@ -28,9 +34,22 @@ _STEP = 0.1  # m, between the points of the tile that are looked at.
 def place(
     out: OutOption,
     wall: Annotated[
-        str,
-        typer.Option(metavar="WxH", help="Width and height of the wall, m."),
-    ] = "2x2",
+        str | None,
+        typer.Option(
+            metavar="WxH",
+            help="Width and height of the wall, m; default 2x2.",
+            show_default=False,
+        ),
+    ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help="Take the wall and its windows and doors from a scene: a name or a "
+            "YAML file."
+        ),
+    ] = None,
+    include: IncludeOption = None,
+    exclude: ExcludeOption = None,
     scenario: Annotated[
         str,
         typer.Option(help="Robot, tip and settings: a named scenario or a YAML file."),
@@ -45,12 +64,18 @@ def place(
     and strokes.
 
     Raises:
-        InputError: The wall is not given as two lengths, or too small to be divided.
+        InputError: The wall is not given as two lengths, or too small to be divided; a
+            zone is not on it.
     """
     job = load_scenario(scenario, overrides or ())
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)", wall)
-    if found is None or not min(map(float, found.groups())) > 0.0:
-        raise InputError(f"--wall {wall!r}: expected WxH in metres, e.g. 10x6.")
+    if scene is not None and wall is not None:
+        raise InputError("--wall and --scene: only one of them can be given.")
+    what = f"--wall {wall!r}" if scene is None else f"--scene {scene!r}"
+    if scene is None:
+        width, height, zones = *_size(wall or "2x2"), []
+    else:
+        width, height, zones = _wall_of(load_scene(scene, job.random_seed))
+    zones += operator_zones(include, exclude, width, height)
     mapper = ReachMapper(job)
     height = mapper.arm.shoulder_height
     spot = propose_distance(
@@ -61,14 +86,15 @@ def place(
     )
     try:
         stations = plan_stations(
-            float(found[1]),
-            float(found[2]),
+            width,
+            height,
             tile=job.tile,
             tip=job.gun.tip,
             raster=job.raster,
+            zones=zones,
         )
     except ValueError as error:
-        raise InputError(f"--wall {wall!r}: {error}") from error
+        raise InputError(f"{what}: {error}") from error
     document = {
         "units": "m, on the wall from its lower left corner; strokes in T",
         "distance": spot.distance,
@@ -99,3 +125,29 @@ def place(
         },
         as_json=as_json,
     )
+
+
+def _size(wall: str) -> tuple[float, float]:
+    """Reads a wall's width and height, m, from the command line."""
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)", wall)
+    if found is None or not min(map(float, found.groups())) > 0.0:
+        raise InputError(f"--wall {wall!r}: expected WxH in metres, e.g. 10x6.")
+    return float(found[1]), float(found[2])
+
+
+def _wall_of(scene: Scene) -> tuple[float, float, list[ZoneConfig]]:
+    """Returns a scene's wall: width and height, m, and its openings as zones."""
+    wall = scene.wall
+    zones = [
+        ZoneConfig(
+            corners=[
+                [opening.x - wall.x, opening.y - wall.y],
+                [
+                    opening.x - wall.x + opening.width,
+                    opening.y - wall.y + opening.height,
+                ],
+            ]
+        )
+        for opening in scene.openings
+    ]
+    return wall.width, wall.height, zones

@@ -8,10 +8,13 @@ import numpy as np
 import typer
 
 from painter.cli.common import (
+    ExcludeOption,
+    IncludeOption,
     JsonOption,
     OutOption,
     SetOption,
     mark_corners,
+    operator_zones,
     output_folder,
     print_result,
     progress,
@@ -80,6 +83,8 @@ def plan(
             "tile's lower left corner.",
         ),
     ] = None,
+    include: IncludeOption = None,
+    exclude: ExcludeOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan the paint program of a segmented wall.
@@ -93,6 +98,8 @@ def plan(
     if touch_up is not None and mark is not None:
         raise InputError("--touch-up and --mark: only one of them can be given.")
     job = load_scenario(scenario, overrides or ())
+    tile = job.tile
+    job.raster.zones += operator_zones(include, exclude, tile.width, tile.height)
     wall = load_segmentation(segmentation)
     if expected_wall:
         wall = wall.replace(X_WT=nominal_tile_pose(job.tile))
@@ -114,10 +121,11 @@ def plan(
             program = planner.program(rest, wall, home)
         compute_time = time.perf_counter() - start
         show(0.8, "files")
-        preview = preview_film(program.strokes, wall, tip=planner.tip, nominal=nominal)
+        asked = wall.replace(wall_mask=planner.wanted(wall))
+        preview = preview_film(program.strokes, asked, tip=planner.tip, nominal=nominal)
         save_program(folder, program, preview)
         (folder / PICTURE_FILE).write_bytes(png(stroke_picture(program, wall)))
-        drawn = preview_picture(preview, wall, nominal)
+        drawn = preview_picture(preview, asked, nominal)
         (folder / PREVIEW_FILE).write_bytes(png(drawn))
         show(1.0, "done")
     result = program_summary(program) | {

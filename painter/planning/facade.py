@@ -4,21 +4,25 @@ All stations share one grid of lines over the whole wall, and a line belongs to 
 station alone: beside one another they join as the lines of one tile do. Above one
 another strokes end in a ramp, their flow falling in steps over the overlap while that
 of the next station's strokes rises: there an error of place makes a fraction of the
-bead or gap that two blunt ends would make.
+bead or gap that two blunt ends would make. Where windows and doors are known, lines are
+cut at them, and places with nothing to paint get no station.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from painter.planning.config import RasterConfig, TileConfig, TipConfig
+from painter.planning.config import RasterConfig, TileConfig, TipConfig, ZoneConfig
 from painter.planning.spray_path import Stroke
-from painter.planning.stroke_lines import nominal_pitch
-from perception.values import FrozenValue
+from painter.planning.stroke_lines import nominal_pitch, wall_share
+from painter.planning.zones import in_zones
+from perception.values import FloatArray, FrozenValue
 
 _OVERLAP = 0.20  # m, height over which strokes of two stations blend,
 _RAMP_STEPS = 4  # and the steps in which their flow falls and rises.
+_CELL = 0.01  # m, of the grid on which zones are drawn.
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +67,11 @@ def plan_stations(
     tile: TileConfig,
     tip: TipConfig,
     raster: RasterConfig,
+    zones: Sequence[ZoneConfig] = (),
 ) -> tuple[Station, ...]:
     """Divides a wall into stations and lays strokes that join without a seam.
 
-    The wall is taken as bare: what each station finds on its tile cuts its strokes.
+    What each station finds on its tile cuts its strokes further.
 
     Args:
         width: Of the wall, m.
@@ -75,6 +80,7 @@ def plan_stations(
             platform that the arm stands on.
         tip: The spray tip.
         raster: Settings of the strokes.
+        zones: What of the wall is to be painted or left, on its own axes.
 
     Returns:
         Stations in order of execution: row by row from below, to and fro.
@@ -97,6 +103,8 @@ def plan_stations(
     if height > tile.height:
         rows = math.ceil((height - _OVERLAP) / (tile.height - _OVERLAP) - 1e-9)
     step = (height - _OVERLAP) / rows if rows > 1 else height
+    x_lines = (np.arange(lines) + 0.5) * pitch
+    painted = _painted(x_lines, width, height, zones, tip=tip, raster=raster)
     stations: list[Station] = []
     for row in range(rows):
         bottom = row * step
@@ -105,21 +113,23 @@ def plan_stations(
         order = range(columns) if row % 2 == 0 else range(columns - 1, -1, -1)
         for column in order:
             first, last = edges[column], edges[column + 1]
-            strokes: list[Stroke] = []
-            for line in range(last - first):
-                x = (line + 0.5) * pitch
-                strokes += [
-                    Stroke(
-                        start_T=np.array([x, low]),
-                        end_T=np.array([x, high]),
-                        speed=raster.speed,
-                        kind="body",
-                        column=line,
-                        standoff=raster.standoff,
-                        flow=flow,
-                    )
-                    for low, high, flow in spans
-                ]
+            strokes = [
+                Stroke(
+                    start_T=np.array([x_lines[line] - first * pitch, low]),
+                    end_T=np.array([x_lines[line] - first * pitch, high]),
+                    speed=raster.speed,
+                    kind="body",
+                    column=int(line - first),
+                    standoff=raster.standoff,
+                    flow=flow,
+                )
+                for line in range(first, last)
+                for low, high, flow in _within(
+                    spans, painted[line] - bottom, raster.min_stroke
+                )
+            ]
+            if not strokes:
+                continue
             stations.append(
                 Station(
                     left=float(first * pitch),
@@ -132,6 +142,45 @@ def plan_stations(
                 )
             )
     return tuple(stations)
+
+
+def _painted(
+    x_lines: FloatArray,
+    width: float,
+    height: float,
+    zones: Sequence[ZoneConfig],
+    *,
+    tip: TipConfig,
+    raster: RasterConfig,
+) -> list[FloatArray]:
+    """Returns for each line the stretches (k, 2), m, on which the gun may be open."""
+    shape = (max(1, round(height / _CELL)), max(1, round(width / _CELL)))
+    bare = np.ones(shape, dtype=bool)
+    standoff = raster.standoff
+    flow = [
+        wall_share(mask, _CELL, x_lines, tip=tip, standoff=standoff)
+        for mask in (in_zones(bare, _CELL, zones), bare)
+    ]
+    # At the wall's own edges part of the fan goes past it either way.
+    on = flow[0] >= raster.wall_share * flow[1]
+    stretches = []
+    for column in on.T:
+        edges = np.flatnonzero(np.diff(column, prepend=False, append=False))
+        ends = edges.reshape(-1, 2) * _CELL + np.array([-raster.lead, raster.lead])
+        stretches.append(ends)
+    return stretches
+
+
+def _within(
+    spans: list[tuple[float, float, float]], stretches: FloatArray, shortest: float
+) -> list[tuple[float, float, float]]:
+    """Returns the parts of spans (low, high, flow) that lie in stretches (k, 2)."""
+    parts = [
+        (max(low, float(start)), min(high, float(end)), flow)
+        for low, high, flow in spans
+        for start, end in stretches
+    ]
+    return [part for part in parts if part[1] - part[0] >= shortest]
 
 
 def _ramped(

@@ -22,7 +22,7 @@ from painter.planning.stroke_order import order_strokes
 from painter.planning.touch_up import touch_up_strokes
 from painter.planning.verify import verify_motion, verify_strokes
 from painter.planning.zones import in_zones
-from perception.values import FloatArray, FrozenValue, WallSegmentation
+from perception.values import BoolArray, FloatArray, FrozenValue, WallSegmentation
 
 _TRIMS = (0.0, 0.02, 0.05, 0.10, 0.20)  # m, off a stroke's end for room to turn.
 
@@ -64,6 +64,11 @@ class ProgramPlanner(FrozenValue):
             height=np.asarray(segmentation.depth, dtype=np.float64),
         )
 
+    def wanted(self, segmentation: WallSegmentation) -> BoolArray:
+        """Returns the wall (ny, nx) that the operator's zones leave to be painted."""
+        mask = np.asarray(segmentation.wall_mask)
+        return in_zones(mask, segmentation.cell, self.raster.zones)
+
     def touch_up_strokes(
         self, segmentation: WallSegmentation, film: FloatArray
     ) -> tuple[Stroke, ...]:
@@ -73,11 +78,10 @@ class ProgramPlanner(FrozenValue):
             segmentation: Of the tile.
             film: m, on the tile and `margin_cells` around it.
         """
-        mask, cell = np.asarray(segmentation.wall_mask), segmentation.cell
-        wanted = in_zones(mask, cell, self.raster.zones)
+        depth = np.asarray(segmentation.depth, dtype=np.float64)
         return touch_up_strokes(
             film,
-            Site.of_tile(wanted, cell, np.asarray(segmentation.depth, np.float64)),
+            Site.of_tile(self.wanted(segmentation), segmentation.cell, depth),
             nominal=self.nominal_film(segmentation),
             tip=self.tip,
             raster=self.raster,

@@ -95,6 +95,18 @@ def test_mark_is_painted_anew_and_nothing_else(wall, tmp_path):
     np.testing.assert_array_less(ends.max(axis=(0, 1)), [0.43, 1.83])
 
 
+def test_zones_of_the_operator_are_kept(wall, tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["--include", "0,0,1,2", "--exclude", "0,1,1,2", "--json"]
+    assert run(["plan", wall, *words, "--out", str(out)]) == 0
+    ends = np.array([[s.start_T, s.end_T] for s in strokes_of(out)])
+    assert ends[..., 0].max() < 1.0
+    assert ends[..., 1].max() < 1.05
+    # What is left out by the operator does not count as bare.
+    predicted = json.loads(capsys.readouterr().out)["predicted"]
+    assert predicted["coverage"] > 0.9
+
+
 def test_job_goes_on_from_a_stroke(wall, tmp_path):
     for name, words in (("all", []), ("rest", ["--from-stroke", "4.5"])):
         assert run(["plan", wall, *words, "--out", str(tmp_path / name)]) == 0
@@ -107,6 +119,7 @@ def test_options_that_do_not_fit_are_refused(wall, tmp_path, capsys):
     out = str(tmp_path / "out")
     for words, text in (
         (["--mark", "1,2,3"], "--mark '1,2,3'"),
+        (["--exclude", "0,0,3,1"], "--exclude '0,0,3,1'.corners: x must be 0 to 2 m"),
         (["--from-stroke", "500"], "from_stroke must be 1 to"),
         (["--touch-up", str(tmp_path)], "film.npz: no such file"),
         (["--touch-up", "x", "--mark", "0,0,1,1"], "only one of them"),

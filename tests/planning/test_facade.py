@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from painter.errors import ReachError
-from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
+from painter.planning.config import (
+    MotionConfig,
+    RasterConfig,
+    TileConfig,
+    TipConfig,
+    ZoneConfig,
+)
 from painter.planning.deposition import mean_film, predicted_film
 from painter.planning.facade import plan_stations
 from painter.planning.placement import propose_distance
@@ -55,6 +61,43 @@ def test_film_across_joints_is_within_a_tenth_of_nominal(shift):
     inside = film[15:-15, 15:-15]  # The wall's own edges are no joints.
     assert inside.min() >= 0.9
     assert inside.max() <= 1.1
+
+
+DOOR = ZoneConfig(corners=[[3.0, 0.0], [4.0, 2.1]])
+
+
+def test_openings_stay_clean_and_their_surroundings_are_painted():
+    stations = plan_stations(6.0, 3.6, tile=TILE, tip=TIP, raster=RASTER, zones=[DOOR])
+    x = np.arange(0.005, 6.0, 0.01)
+    y = np.arange(0.005, 3.6, 0.01)
+    film = film_on(stations, x, y)
+    half_fan = 13  # Cells; so far a line beside the door reaches over its edge.
+    assert film[:200, 300 + half_fan : 400 - half_fan].max() == 0.0
+    assert film[15:200, 15 : 300 - half_fan].min() >= 0.9
+    assert film[15:200, 400 + half_fan : -15].min() >= 0.9
+    assert film[225:-15, 15:-15].min() >= 0.9  # Over the door, too.
+
+
+def test_no_station_stands_before_an_opening_alone():
+    whole = stations_of(6.0, 2.0)
+    # All that one station would paint is a gate.
+    gate = ZoneConfig(
+        corners=[
+            [whole[1].left, 0.0],
+            [whole[1].left + whole[1].width, 2.0],
+        ]
+    )
+    dut = plan_stations(6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[gate])
+    assert [s.left for s in dut] == [s.left for s in whole if s is not whole[1]]
+
+
+def test_only_what_is_included_gets_strokes():
+    zone = ZoneConfig(kind="include", corners=[[0.5, 0.5], [1.5, 1.5]])
+    (dut,) = plan_stations(6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[zone])
+    ends = np.array([[s.start_T, s.end_T] for s in dut.strokes_on_wall])
+    assert ends[..., 0].min() > 0.45 and ends[..., 0].max() < 1.55
+    assert ends[..., 1].min() == pytest.approx(0.5, abs=0.02)
+    assert ends[..., 1].max() == pytest.approx(1.5, abs=0.02)
 
 
 def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):

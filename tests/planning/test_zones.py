@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from painter.config import load_scenario
+from painter.errors import InputError
 from painter.planning.config import RasterConfig, TipConfig, ZoneConfig
 from painter.planning.raster import plan_strokes
 from painter.planning.tips import airless_tip
@@ -39,13 +41,29 @@ def test_strokes_keep_out_of_a_zone():
     [
         ({"direction": "horizontal"}, "cannot roll"),
         ({"zones": [ZoneConfig(kind="maybe", corners=[[0, 0], [1, 1]])]}, "kind"),
-        ({"zones": [ZoneConfig(corners=[[0, 0]])]}, "corners"),
+        ({"zones": [ZoneConfig(corners=[[0, 0]])]}, "two or more pairs x, y"),
+        (
+            {"zones": [ZoneConfig(), ZoneConfig()]},
+            r"raster\.zones\[0\]\.corners must be two or more",
+        ),
+        (
+            {"zones": [ZoneConfig(corners=[[0.5, 0.2], [0.5, 0.9]])]},
+            r"raster\.zones\[0\]\.corners must enclose more than 0 m²",
+        ),
         ({"cut_in_standoff": 0.02}, "cut_in_standoff"),
     ],
 )
 def test_what_cannot_be_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
         RasterConfig(**change).validate()
+
+
+def test_a_zone_beyond_the_tile_names_axis_value_and_bound():
+    word = "raster.zones=[{corners: [[0.1, 0.1], [0.5, 25.0]]}]"
+    with pytest.raises(
+        InputError, match=r"zones\[0\]\.corners: y must be 0 to 2 m, got 25\.0"
+    ):
+        load_scenario("blank", [word])
 
 
 def test_the_default_tip_is_a_515():
