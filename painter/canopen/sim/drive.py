@@ -77,8 +77,8 @@ class SimDrive(SimNode):
         return self.motor.position + self._offset
 
     def on_reset(self) -> None:
-        """Power is off, the brake closed."""
-        self.state = State.SWITCH_ON_DISABLED
+        """Power is off, the brake closed; transition 0."""
+        self.state = State.NOT_READY
         self.demand = Demand(self.position)
         self._target = SyncedTarget()
         self._controlword = 0
@@ -89,6 +89,11 @@ class SimDrive(SimNode):
         self._homing: HomingRun | None = None
         self._homed = False
         self.brake_closed = True
+
+    def on_boot(self) -> None:
+        """The drive is initialised, transition 1."""
+        if self.state == State.NOT_READY:
+            self.state = State.SWITCH_ON_DISABLED
 
     def trip(self, code: int) -> None:
         """Goes into fault reaction, transition 13, and says why."""

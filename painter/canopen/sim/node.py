@@ -74,6 +74,9 @@ class SimNode:
 
     # What children add.
 
+    def on_boot(self) -> None:
+        """The node is initialised."""
+
     def on_reset(self) -> None:
         """The node was reset; the store has its power-on values."""
 
@@ -122,6 +125,7 @@ class SimNode:
         if self.nmt == Nmt.INITIALISING:
             if self.now >= self._boot_at:
                 self.nmt = Nmt.PRE_OPERATIONAL
+                self.on_boot()
                 self.send(HEARTBEAT_BASE + self.node_id, b"\0")
                 self._next_heartbeat = self.now
             return

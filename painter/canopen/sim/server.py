@@ -159,7 +159,8 @@ class RackServer:
                 self._link.reopen()
         now = max(self._now(), self.rack.now)
         for frame in frames:
-            self._send(frame, now)
+            if not frame.is_error:  # Of this computer's controller; no node sees it.
+                self._send(frame, now)
         self.rack.advance(now)
 
     def _to_link(self, frame: Frame, now: float) -> None:
