@@ -12,9 +12,13 @@ STAMP := $(VENV)/.installed
 PYTHON ?= python3 python3.13 python3.12 python3.11
 SYSTEM_PACKAGES := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libgomp1 libusb-1.0-0 \
   libx11-6
+# These measure what is found, not how fast, in hours.
+LONG_BENCHES := $(patsubst %,benchmarks/bench_%.py,\
+  edges fine_steps map map_recordings masks masks_pcl)
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: help setup browser demo test test-all lint format bench notebooks clean
+.PHONY: help setup browser demo test test-all lint format bench bench-all \
+  notebooks clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /:/' \
@@ -95,8 +99,25 @@ format: setup ## Format the code, fix what can be fixed, strip notebooks
 	$(BIN)/ruff check --fix .
 	find notebooks -name '*.ipynb' -not -path '*/.*' -exec $(BIN)/nbstripout {} +
 
-bench: setup ## Measure the speed of single stages
-	@for file in benchmarks/bench_*.py; do $(BIN)/python "$$file"; done
+# Runs some benchmarks one by one and says at the end which have failed.
+define run_benches
+run_benches() {
+  local failed=()
+  for file in "$$@"; do
+    echo "== $$file"
+    $(BIN)/python "$$file" || failed+=("$$file")
+  done
+  if [ $${#failed[@]} -gt 0 ]; then echo "failed: $${failed[*]}" >&2; return 1; fi
+}
+endef
+
+bench: setup ## Measure the speed of single stages (a quarter of an hour)
+	@$(run_benches)
+	run_benches $(filter-out $(LONG_BENCHES),$(wildcard benchmarks/bench_*.py))
+
+bench-all: bench ## Measure masks, maps and recordings too (hours)
+	@$(run_benches)
+	run_benches $(LONG_BENCHES)
 
 notebooks: setup ## Run the notebooks in full and keep them as pages in runs/notebooks
 	@$(BIN)/python -m jupyter nbconvert --log-level=WARN --to html --execute \

@@ -1,11 +1,13 @@
-"""The map accumulator on recordings: `python benchmarks/bench_map_recordings.py DATA`.
+"""The map accumulator on recordings: `bench_map_recordings.py [DATA]`.
 
-DATA holds `rgbd_sequence_with_poses` (7-Scenes, Kinect, KinectFusion's poses) and
+DATA, if left out `real` in the folder that the variable PAINTER_DATA names, holds
+`rgbd_sequence_with_poses` (7-Scenes, Kinect, KinectFusion's poses) and
 `d415_on_robot_arm` (two views of a table from an arm). The given poses are no truth: of
 the tables, the planes that the two views see are compared.
 """
 
 import argparse
+import os
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +26,12 @@ TABLE = MapperConfig(
     arm_sigma=0.005, arm_sigma_deg=1.0, keyframe_distance=1e-4, keyframe_angle_deg=0.01
 )
 SLAB = 0.03
+DATA = Path(os.environ.get("PAINTER_DATA", "../shared/data")) / "real"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("data", type=Path)
+    parser.add_argument("data", nargs="?", type=Path, default=DATA)
     data = parser.parse_args().data
     folder = data / "rgbd_sequence_with_poses"
     given = {entry.time: entry.X_WC for entry in open_recording(folder).entries}

@@ -1,13 +1,13 @@
 """Time, memory, agreement and masks of the wall segmentation beside PCL and Open3D.
 
-Prints, for each size of a furnished wall (`perception.furnished_wall`), medians of
-seconds by step, side by side in one run: ours with exact and with fast filter, Open3D's
-plain calls for the first two steps, and the Point Cloud Library's. "filter", "planes"
-and "tile" (grid and regions) make the paper's six steps, their "total"; "cpu" is the
-processors' time of all threads for these. "refine" draws the mask anew by fine steps,
-and "whole" is what `segment_wall` takes. "MB" is how far the process grew at most while
-it ran. On a machine that others use, only the ratio of "cpu" can be trusted.
-Then whether the points removed and the wall agree, and who finds how much of what.
+Prints, for each size of a furnished wall (`perception.furnished_wall`), the seconds by
+step of the quickest of some runs, as other work on the machine can only add to them:
+ours with exact and with fast filter, Open3D's plain calls for the first two steps, and
+the Point Cloud Library's, in turn. "filter", "planes" and "tile" (grid and regions)
+make the paper's six steps, their "total"; "cpu" is the processors' time of all threads
+for these. "refine" draws the mask anew by fine steps, and "whole" is what
+`segment_wall` takes. "MB" is how far the process grew at most while it ran. Then
+whether the points removed and the wall agree, and who finds how much of what.
 
 PCL's part is a program of its own; where it is comes from --peer or the variable
 PCL_WALL. Without it, that part is left out, as are both peers on clouds of over a
@@ -20,7 +20,6 @@ import argparse
 import ctypes
 import math
 import os
-import statistics
 import tempfile
 import time
 from dataclasses import dataclass
@@ -110,7 +109,7 @@ def memory(name: str) -> float:
 
 
 def compare(points: int, *, program: str, repeats: int, ordered: bool) -> list[Times]:
-    """Measures one cloud, prints the tables and returns the medians of ours."""
+    """Measures one cloud, prints the tables and returns the best runs of ours."""
     wall = furnished_wall(points, seed=1)
     p_CQs = wall.p_CQs
     if ordered:
@@ -122,37 +121,37 @@ def compare(points: int, *, program: str, repeats: int, ordered: bool) -> list[T
         peer = Peer(program, p_CQs, Path(folder)) if program and peers else None
         runs: dict[str, list[Times]] = {}
         outcomes = {}
-        for _ in range(repeats):  # In turn, so that all meet the same machine.
+        for turn in range(repeats):  # In turn, so that all meet the same machine.
             for name, fast in OURS.items():
                 times, outcomes[name] = run_ours(wall, p_CQs, fast=fast)
                 runs.setdefault(name, []).append(times)
-            if peers:
-                runs.setdefault("Open3D, plain", []).append(time_open3d(p_CQs))
+            if peers and turn == 0:
+                runs["Open3D, plain"] = [time_open3d(p_CQs)]  # Once will do: 18 s.
             for name in OPTIONS if peer is not None else ():
                 runs.setdefault(name, []).append(peer.run(name))
-        medians = {name: print_times(name, some) for name, some in runs.items()}
+        best = {name: print_times(name, some) for name, some in runs.items()}
         for name in OURS:
             for other in OPTIONS if peer is not None else ():
                 ratios = (
-                    f"{by} {medians[name][by] / medians[other][by]:.3f}"
+                    f"{by} {best[name][by] / best[other][by]:.3f}"
                     for by in ("total", "cpu")
                 )
                 print(f"  {name} / {other}:", *ratios)
         print_agreement(wall, outcomes, peer)
-    return [medians[name] for name in OURS]
+    return [best[name] for name in OURS]
 
 
 def print_times(name: str, runs: list[Times]) -> Times:
-    """Prints and returns the medians of some runs' figures."""
-    medians = {step: statistics.median(run[step] for run in runs) for step in runs[0]}
+    """Prints and returns the figures of the quickest of some runs."""
+    best = min(runs, key=lambda run: run["total"])
     cells = (
-        (f"{medians[step]:7.0f}" if step == "MB" else f"{medians[step]:7.3f}")
-        if step in medians
+        (f"{best[step]:7.0f}" if step == "MB" else f"{best[step]:7.3f}")
+        if step in best
         else f"{'-':>7}"
         for step in COLUMNS
     )
     print(f"  {name:14}", *cells)
-    return medians
+    return best
 
 
 def print_agreement(
@@ -185,11 +184,11 @@ def print_agreement(
         print(f"  {name:14} {wall.iou(mask):7.4f}", *recalls)
 
 
-def print_growth(medians: dict[int, list[Times]]) -> None:
+def print_growth(best: dict[int, list[Times]]) -> None:
     """Prints the exponents of time and memory against points, fitted to all sizes."""
-    points = np.log(list(medians))
-    print(f"\ngrowth from {min(medians)} to {max(medians)} points, fitted exponents")
-    for name, runs in zip(OURS, zip(*medians.values(), strict=True), strict=True):
+    points = np.log(list(best))
+    print(f"\ngrowth from {min(best)} to {max(best)} points, fitted exponents")
+    for name, runs in zip(OURS, zip(*best.values(), strict=True), strict=True):
         exponents = (
             f"{by} {np.polyfit(points, np.log([run[by] for run in runs]), 1)[0]:.2f}"
             for by in ("total", "whole", "MB")
@@ -207,10 +206,10 @@ def main() -> None:
     options = {"program": args.peer, "repeats": args.repeats}
     if not args.peer:
         print("PCL is left out: neither --peer nor PCL_WALL says where pcl_wall is.")
-    medians = {n: compare(n, **options, ordered=False) for n in args.points}
-    if len(medians) > 1:
-        print_growth(medians)
-    if ORDERED in medians:
+    best = {n: compare(n, **options, ordered=False) for n in args.points}
+    if len(best) > 1:
+        print_growth(best)
+    if ORDERED in best:
         compare(ORDERED, **options, ordered=True)
 
 
