@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.errors import CloudReadError
 from perception.store import load_segmentation, save_segmentation, save_wall_mask
-from perception.values import WallSegmentation
+from perception.values import Opening, WallSegmentation
 
 
 def make_segmentation():
@@ -44,6 +44,36 @@ def test_what_fine_steps_add_comes_back_too(tmp_path):
     for name, grid in extras.items():
         np.testing.assert_array_equal(getattr(loaded, name), grid)
         assert getattr(loaded, name).dtype == grid.dtype
+
+
+def test_openings_come_back_with_their_corners(tmp_path):
+    box = np.array([[0.1, 0.5, 0.5, 0.1], [0.2, 0.2, 0.9, 0.9]])
+    triangle = np.array([[1.0, 1.2, 1.1], [0.0, 0.0, 0.3]])
+    openings = (
+        Opening("rectangle", box, area=0.28, depth=-0.1, glass_share=0.6),
+        Opening("contour", triangle, area=0.03, depth=np.nan, glass_share=1.0),
+    )
+    save_segmentation(
+        tmp_path / "s.npz", make_segmentation().replace(openings=openings)
+    )
+    loaded = load_segmentation(tmp_path / "s.npz").openings
+    assert [opening.kind for opening in loaded] == ["rectangle", "contour"]
+    for one, other in zip(loaded, openings, strict=True):
+        np.testing.assert_array_equal(one.p_TVs, other.p_TVs)
+        np.testing.assert_array_equal(
+            [one.area, one.depth, one.glass_share],
+            [other.area, other.depth, other.glass_share],
+        )
+
+
+def test_openings_that_do_not_belong_together_are_refused(tmp_path):
+    path = tmp_path / "s.npz"
+    save_segmentation(path, make_segmentation())
+    with np.load(path) as file:
+        content = dict(file)
+    np.savez(path, **content, opening_kind=np.array(["rectangle"]))
+    with pytest.raises(CloudReadError, match="opening_area is missing"):
+        load_segmentation(path)
 
 
 def test_file_has_the_names_and_types_of_the_design(tmp_path):
