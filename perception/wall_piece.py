@@ -133,7 +133,7 @@ def _settle(
                 limit = max(least, window * blocks.noise, scatter)
                 off = np.where(cells, off / limit, 1.0)
                 weight = np.square(np.maximum(1.0 - off * off, 0.0))
-                count = np.count_nonzero(weight)
+                count = int(np.count_nonzero(weight))
                 if not count:
                     raise ValueError("the wall's cells lie on no surface.")
                 coefficients = spline.solve(weight, values, penalty)

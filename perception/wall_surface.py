@@ -25,6 +25,9 @@ from perception.wall_corners import part_at_corners
 from perception.wall_piece import Blocks, Piece, fit_piece, run_on, surface_normals
 
 _FIT_CELL = 0.02
+_MOST_FIT_CELL = 0.125
+_NEIGHBOURED = 0.9
+"""Share of blocks beside which there is another, from which they show steps."""
 _EDGE_BLOCKS = 3.0
 _LEAST_CELLS = 500
 _NEAR = 0.03  # Standard deviation about T's plane within which the wall is looked for.
@@ -71,6 +74,9 @@ def fit_wall_surface(
     if np.count_nonzero(use) < _LEAST_CELLS * step**2:
         step = 1
     medians = _block_medians(depth, step)
+    while _neighboured(medians) < _NEIGHBOURED and step * cell < _MOST_FIT_CELL:
+        step += 1  # Between scan lines there are cells without a point.
+        medians = _block_medians(depth, step)
     # Over such blocks the slope of waves is no longer small.
     spread = neighbour_noise(medians, np.isfinite(medians), order=2)
     blocks = Blocks(
@@ -84,7 +90,10 @@ def fit_wall_surface(
         rng=rng,
     )
     may_be = np.isfinite(_block_medians(np.where(use, depth, np.nan), step))
-    parts = part_at_corners(blocks, _patch_of_wall(blocks, may_be))
+    patch = _patch_of_wall(blocks, may_be)
+    parts = part_at_corners(blocks, patch)
+    if len(parts) == 1:
+        parts = [patch & may_be]
     # No piece runs on in blocks of another's patches.
     others = np.unique(blocks.patches[np.any(parts, axis=0)])
     free = np.where(np.isin(blocks.patches, others), -1, blocks.patches)
@@ -176,6 +185,18 @@ def _block_medians(depth: FloatArray, step: int) -> FloatArray:
     middle = [np.maximum(known - 1, 0) // 2, known // 2]
     medians = np.take_along_axis(blocks, np.stack(middle, axis=-1), axis=2)
     return np.asarray(medians.mean(axis=2))
+
+
+def _neighboured(depth: FloatArray) -> float:
+    """Returns the share of known cells that have a known one on their right and above.
+
+    Along scan lines there are neighbours on two sides and between them none.
+    """
+    known = np.isfinite(depth)
+    count = max(1, int(np.count_nonzero(known)))
+    right = np.count_nonzero(known[:, :-1] & known[:, 1:])
+    above = np.count_nonzero(known[:-1] & known[1:])
+    return min(right, above) / count
 
 
 def _centres(count: int, cell: float) -> FloatArray:
