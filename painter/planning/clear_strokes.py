@@ -13,6 +13,8 @@ _STEP = 0.03  # m along a stroke, between the places that are looked at.
 # m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
 # the room in which the arm stops and turns at 0.6 m/s.
 _STOPPING = 0.12
+# m beyond a stroke's end and away from the wall: where the arm stops, and on the way.
+_RUN_OUT = ((0.10, 0.03), (0.05, 0.01))
 # Share of the strokes' length; if more is out of reach the arm stands in the wrong
 # place.
 _MOST_OUT_OF_REACH = 0.05
@@ -68,6 +70,32 @@ def clear_strokes(
         clear += kept
         skipped += lost
     return clear, skipped
+
+
+def has_run_out(strokes: Sequence[Stroke], linker: Linker) -> BoolArray:
+    """Tells beyond which strokes the gun has room to come to a stand, as they go.
+
+    Args:
+        strokes: In T.
+        linker: Knows reach and clearance.
+
+    Returns:
+        (n,) bool; where it is True, to look for the move itself is hardly ever in vain.
+    """
+    if not strokes:
+        return np.zeros(0, dtype=bool)
+    along = [(stroke.end_T - stroke.start_T) / stroke.length for stroke in strokes]
+    p_TGs = np.stack(
+        [
+            np.append(stroke.end_T + beyond * ahead, stroke.standoff + out)
+            for stroke, ahead in zip(strokes, along, strict=True)
+            for beyond, out in _RUN_OUT
+        ]
+    )
+    q = linker.gun.solve(p_TGs)
+    free = linker.limits.contains(q)
+    free[free] = linker.space.free(q[free])
+    return np.asarray(free.reshape(len(strokes), -1).all(axis=1))
 
 
 def nozzle_points(p_T: FloatArray, standoff: float) -> FloatArray:

@@ -8,7 +8,11 @@ from pydrake.planning import CollisionChecker
 
 from painter.errors import CollisionError, InputError, ReachError
 from painter.planning.blend import MovingState
-from painter.planning.clear_strokes import clear_strokes, nozzle_points
+from painter.planning.clear_strokes import (
+    clear_strokes,
+    has_run_out,
+    nozzle_points,
+)
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.film_model import Site
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
@@ -131,7 +135,7 @@ class ProgramPlanner(FrozenValue):
             _, p_WGs = self.kinematics.gun_poses(q[None])
             rests.append(gun.X_WT.inverse() @ p_WGs[0])
         ordered = order_strokes(clear, *rests)
-        path, strokes, passes, unlinked = _link(ordered, q0, linker)
+        path, strokes, passes, unlinked = _linked(ordered, q0, linker)
         starts = start_times(path)[:-1]
         flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
         program = PaintProgram(
@@ -186,22 +190,34 @@ def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke,
     )
 
 
-def _link(
-    strokes: Sequence[Stroke], q0: FloatArray, linker: Linker
-) -> tuple[list[Segment], tuple[Stroke, ...], list[int], list[SkippedStroke]]:
-    """Joins strokes by moves, from rest at `q0` to rest at home.
+# The segments; the strokes that could be come to; the index of each one's segment; and
+# the strokes that could not, with the reason.
+_Links = tuple[list[Segment], tuple[Stroke, ...], list[int], list[SkippedStroke]]
 
-    Returns:
-        The segments; the strokes that could be come to; the index of each one's
-        segment; and the strokes that could not, with the reason.
-    """
+
+def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> _Links:
+    """Joins strokes by moves, from rest at `q0` to rest at home."""
+    try:
+        links = _link(strokes, has_run_out(strokes, linker), q0, linker)
+        if not links[-1]:
+            return links
+    except (CollisionError, ReachError):
+        pass
+    # Something is in the way: now the way back is looked for after every stroke.
+    return _link(strokes, np.zeros(len(strokes), dtype=bool), q0, linker)
+
+
+def _link(
+    strokes: Sequence[Stroke], run_out: BoolArray, q0: FloatArray, linker: Linker
+) -> _Links:
+    """Does so; where `run_out` (n,) is True, there is known to be a way back."""
     path: list[Segment] = []
     done: list[Stroke] = []
     passes: list[int] = []
     skipped: list[SkippedStroke] = []
     last: Pass | None = None
-    for wanted in strokes:
-        fit = _fit(wanted, last, q0, linker)
+    for wanted, roomy in zip(strokes, run_out, strict=True):
+        fit = _fit(wanted, roomy, last, q0, linker)
         skipped += fit.skipped
         if fit.stroke is None:
             continue
@@ -228,11 +244,14 @@ class _Fit:
     skipped: list[SkippedStroke]
 
 
-def _fit(wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker) -> _Fit:
+def _fit(
+    wanted: Stroke, roomy: bool, last: Pass | None, q0: FloatArray, linker: Linker
+) -> _Fit:
     """Joins a stroke to the last pass, or to rest at `q0`, trimming it if need be.
 
     In a corner of the tile, or close to the floor, there may be no room to turn at full
-    speed beyond a stroke's end; then the end is trimmed until there is.
+    speed beyond a stroke's end; then the end is trimmed until there is. Where it is
+    `roomy` there is.
     """
     trims = np.array(_TRIMS) / wanted.length
     first_failure = ""
@@ -240,6 +259,8 @@ def _fit(wanted: Stroke, last: Pass | None, q0: FloatArray, linker: Linker) -> _
         if trims[end] >= 1.0:
             return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
         stroke = wanted.part(0.0, 1.0 - trims[end])
+        if roomy:
+            break
         try:
             linker.to_rest(_pass(stroke).end)  # There must be a way back.
             break

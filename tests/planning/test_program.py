@@ -5,7 +5,9 @@ import pytest
 from pydrake.math import RigidTransform
 
 from painter.errors import InputError, MotionLimitError, ReachError
+from painter.planning.clear_strokes import has_run_out
 from painter.planning.config import MotionConfig
+from painter.planning.obstacles import ObstacleBox
 from painter.planning.program import strokes_from
 from painter.planning.spray_path import Motion, Stroke
 from painter.planning.verify import verify_motion, verify_strokes
@@ -198,3 +200,24 @@ def test_a_little_out_of_reach_is_left_out(robot, make_wall):
     assert len(dut.strokes) == 5
     (left_out,) = (s for s in dut.skipped if s.reason == "out of the arm's reach")
     assert max(left_out.stroke.start_T[1], left_out.stroke.end_T[1]) == 2.5
+
+
+def test_a_stroke_that_ends_in_a_corner_with_no_way_on_is_trimmed(robot, make_wall):
+    # A shelf over the stroke's end: there the gun can neither go on nor draw back much.
+    shelf = (slice(150, 154), slice(60, 140), 0.45)
+    stroke = Stroke(np.array([1.0, 0.5]), np.array([1.0, 1.36]), 0.6, "body", 0, 0.3)
+    dut = plan(robot, make_wall(shelf), strokes=[stroke])
+    (done,) = dut.strokes
+    assert done.length <= stroke.length
+    assert sum(s.stroke.length for s in dut.skipped) == pytest.approx(
+        stroke.length - done.length
+    )
+
+
+def test_run_out_is_room_beyond_the_end_in_the_direction_of_travel(robot):
+    shelf = ObstacleBox("shelf", np.array([0.6, 1.5, 0.0]), np.array([1.4, 1.6, 0.34]))
+    up = Stroke(np.array([1.0, 0.9]), np.array([1.0, 1.36]), 0.6, "body", 0, 0.3)
+    down = up.replace(start_T=up.end_T, end_T=up.start_T)
+    dut = has_run_out([up, down], robot.linker(shelf))
+    assert dut.tolist() == [False, True]
+    assert has_run_out([up, down], robot.linker()).tolist() == [True, True]
