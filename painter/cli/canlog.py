@@ -4,13 +4,15 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
+from painter.canopen.bus_config import BusConfig
 from painter.canopen.bus_file import load_bus
-from painter.canopen.candump import LogRecord, read_lines
+from painter.canopen.candump import LogRecord, read_lines, read_log
 from painter.canopen.decoder import Decoded, Decoder, Kind
 from painter.canopen.log_summary import LogSummary
-from painter.cli.common import JsonOption, print_result
+from painter.cli.common import JsonOption, output_folder, print_result
 from painter.errors import InputError
 from painter.resources import models_path
 
@@ -51,6 +53,14 @@ def canlog(
     summary: Annotated[
         bool, typer.Option("--summary", help="Print the figures alone.")
     ] = False,
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Play the log into the robot's diagram and write what it saw to "
+            "executed.npz there.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show a log of the bus in words of CiA 301 and 402, and its figures.
@@ -60,6 +70,9 @@ def canlog(
     even SYNC was, and every emergency, SDO abort and error frame.
     """
     bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
+    if replay is not None:
+        print_result(_replay(log, bus, replay), as_json=as_json)
+        return
     decoder, figures = Decoder(bus), LogSummary(bus.bitrate)
     known = decoder.node_names
     for node in nodes or ():
@@ -85,6 +98,44 @@ def canlog(
         raise InputError(f"{log}: holds no CANopen frames.")
     if not is_shown:
         print_result(figures.figures() | {"foreign": foreign}, as_json=as_json)
+
+
+def _replay(log: Path, bus: BusConfig, folder: Path) -> dict[str, object]:
+    """Plays a log into the diagram; returns its figures."""
+    # Drake is loaded for this alone.
+    from painter.canopen.log_bus import LogBus
+    from painter.config import Scenario
+    from painter.diagrams.log_replay import ReplayLog
+    from painter.run.arrays import save_executed
+    from painter.run.values import Executed
+
+    try:
+        played = LogBus(bus, read_log(log).records)
+    except InputError as error:
+        raise InputError(f"{log}: {str(error).removeprefix(f'{log}: ')}") from error
+    found = ReplayLog(Scenario(), played, bus.cycle)
+    with output_folder(folder) as draft:
+        save_executed(
+            draft / "executed.npz",
+            Executed(
+                time=found.time,
+                q=found.q,
+                v=found.v,
+                trigger=found.trigger,
+                X_WG=found.X_WG,
+                X_WG_desired=found.X_WG_desired,
+            ),
+        )
+    p_WG, p_WG_desired = found.X_WG[:, :3, 3], found.X_WG_desired[:, :3, 3]
+    lag = np.linalg.norm(p_WG - p_WG_desired, axis=1)
+    steps = np.linalg.norm(np.diff(p_WG, axis=0), axis=1)
+    return {
+        "duration_s": float(found.time[-1]),
+        "tip_travel_m": float(steps.sum()),
+        "tip_lag_max_m": float(lag.max()),
+        "spraying_s": bus.cycle * int(np.count_nonzero(found.trigger)),
+        "stops": [f"{time:.3f} {reason}" for time, reason in found.stops],
+    }
 
 
 def _is_wanted(

@@ -88,10 +88,27 @@ def test_only_what_is_asked_for_is_shown(log, capsys):
     assert all(0.5 <= float(line.split()[0]) <= 0.6 for line in lines)
 
 
+def test_a_log_is_played_into_the_robots_diagram(log, tmp_path, capsys):
+    assert run(["canlog", str(log), "--replay", str(tmp_path / "out"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    with np.load(tmp_path / "out" / "executed.npz") as executed:
+        time, q, X_WG = executed["time"], executed["q"], executed["X_WG"]
+    # All joints at 0.05 rad/s for half a second from when they were enabled.
+    middle = q[np.searchsorted(time, 0.4)] - q[np.searchsorted(time, 0.2)]
+    np.testing.assert_allclose(middle, 0.01, atol=1e-4)
+    stop, reason = found["stops"][0].split(maxsplit=1)
+    assert "elbow_pitch: EMCY 3220h" in reason
+    assert float(stop) == pytest.approx(0.5, abs=0.03)
+    assert np.linalg.det(X_WG[-1, :3, :3]) == pytest.approx(1.0)
+    # Shoulder, elbow and wrist pitch alone lower the gun by some cm.
+    assert 0.02 < found["tip_travel_m"] < 0.2
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
         (["none.log"], "none.log: no such log"),
+        (["none.log", "--replay", "out"], "none.log: no such log"),
         (["{log}", "--node", "knee"], "--node 'knee': known are base_yaw"),
         (["{log}", "--bus", "none.yaml"], "none.yaml: no such bus file"),
         (["{log}", "--kind", "pdo"], "--kind"),
