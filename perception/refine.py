@@ -30,6 +30,7 @@ def refine_segmentation(
     *,
     counts: IntArray | None = None,
     variances: FloatArray | None = None,
+    p_TCs: FloatArray | None = None,
     config: SegmentationConfig,
     seed: int,
 ) -> WallSegmentation:
@@ -44,6 +45,7 @@ def refine_segmentation(
         p_TQs: (3, N) m, in T: the points it was made of, outliers left out.
         counts: (N,) measurements in each point; all alike if left out.
         variances: (N,) m², of one measurement of each point; unknown if left out.
+        p_TCs: (3, k) m, in T, where the pictures were taken; unknown if left out.
         config: Thresholds.
         seed: Of RANSAC's random triples.
 
@@ -86,7 +88,7 @@ def refine_segmentation(
     mask = drop_specks(~off & ~hole, min_area=config.min_region_area, cell=cell)
     side = np.where(residual >= 0.0, Reason.RAISED, Reason.RECESSED)
     reason = np.where(off, _fill(side, seen, gap), Reason.SPECK)
-    reason = explain(reason, residual, hole, cell=cell)
+    reason = explain(reason, residual, hole, cell=cell, p_TCs=p_TCs)
     openings = find_openings(reason, residual, cell=cell)
     for opening in openings:
         # The outline decides where the sub-cells disagree, no farther.

@@ -87,6 +87,7 @@ def segment_wall(
     seed: int,
     counts: IntArray | None = None,
     variances: FloatArray | None = None,
+    p_WCs: FloatArray | None = None,
     up_W: FloatArray | None = None,
 ) -> WallSegmentation:
     """Parts the wall tile in front of the robot into wall and other regions.
@@ -105,6 +106,7 @@ def segment_wall(
         seed: Of RANSAC's random triples; same cloud and seed, same result.
         counts: (N,) measurements fused into each point, where that is known.
         variances: (N,) m², of one measurement of each point along the wall's normal.
+        p_WCs: (3, k) m, in W, where the pictures were taken, square to the wall.
         up_W: (3,) unit, against gravity: what lies level is no wall; see
             `choose_plane`.
 
@@ -137,6 +139,7 @@ def segment_wall(
         wall.X_WT.inverse() @ found.p_WQs.compress(found.kept, axis=1),
         counts=None if counts is None else counts[used],
         variances=None if variances is None else variances[used],
+        p_TCs=None if p_WCs is None else wall.X_WT.inverse() @ p_WCs,
         config=config,
         seed=seed,
     )

@@ -13,6 +13,7 @@ from scipy.ndimage import (
     maximum,
 )
 
+from perception.sight import seen_from
 from perception.values import BoolArray, FloatArray, IntArray
 
 _FAR = 0.25
@@ -20,6 +21,14 @@ _FAR = 0.25
 _SHADOW_REACH = 1.5
 """Shadows reach so many times the height of what casts them: a view at 56 deg."""
 _SHADOW_MARGIN = 0.02
+"""So near to an edge the matcher loses wall that is not hidden, m."""
+_SURE_VIEW = 0.5
+"""A camera that looks square at the wall has in its picture what lies no farther aside
+than this times its distance."""
+_SURE_PICTURES = 5
+"""What so many pictures should have shown is not hidden."""
+_MOST_EYES = 40
+"""Of more pictures, evenly chosen ones will do."""
 _LEAST_PANE = 0.02
 """Smaller holes without a frame are not taken for panes, m²."""
 _PANE_FILL = 0.85
@@ -63,26 +72,35 @@ def close_gaps(seen: BoolArray, *, spacing: float, cell: float) -> BoolArray:
 
 
 def explain(
-    reason: IntArray, residual: FloatArray, hole: BoolArray, *, cell: float
+    reason: IntArray,
+    residual: FloatArray,
+    hole: BoolArray,
+    *,
+    cell: float,
+    p_TCs: FloatArray | None = None,
 ) -> IntArray:
     """Says of each hole whether it is glass, a shadow or simply unseen.
 
     A hole beside something raised, no farther than that can hide the wall from a
-    slanting view, is its shadow. One that touches a recess, or is a large upright
-    rectangle, is glass. So is what shows things far behind the wall.
+    slanting view, is its shadow, unless it should have shown in pictures whose places
+    are known. One that touches a recess, or is a large upright rectangle, is glass. So
+    is what shows things far behind the wall.
 
     Args:
         reason: (ny, nx) values of `Reason`, as far as the seen cells go.
         residual: (ny, nx) m before the wall's surface; NaN = not seen.
         hole: (ny, nx) unseen cells.
         cell: Edge of a cell, m.
+        p_TCs: (3, k) m, in T, where the pictures were taken, square to the wall; None
+            if that is not known.
 
     Returns:
         (ny, nx) values of `Reason` for all cells.
     """
     result = np.where(hole, Reason.UNSEEN, reason)
     result[~hole & (result == Reason.RECESSED) & (residual < -_FAR)] = Reason.GLASS
-    shadow = hole & _in_shadow(result == Reason.RAISED, residual, cell)
+    raised = result == Reason.RAISED
+    shadow = in_shadow(hole, raised, residual, cell=cell, p_TCs=p_TCs)
     result[shadow] = Reason.SHADOW
     recess = (result == Reason.RECESSED) | (result == Reason.GLASS)
     parts, count = label(hole & ~shadow, structure=_SQUARE)
@@ -97,8 +115,26 @@ def explain(
     return result
 
 
-def _in_shadow(raised: BoolArray, residual: FloatArray, cell: float) -> BoolArray:
-    """Finds the cells near enough to something raised to be hidden by it."""
+def in_shadow(
+    hole: BoolArray,
+    raised: BoolArray,
+    residual: FloatArray,
+    *,
+    cell: float,
+    p_TCs: FloatArray | None = None,
+) -> BoolArray:
+    """Finds the holes that something raised hides.
+
+    Args:
+        hole: (ny, nx) unseen cells.
+        raised: (ny, nx) cells of what stands before the wall.
+        residual: (ny, nx) m before the wall's surface; NaN = not seen.
+        cell: Edge of a cell, m.
+        p_TCs: See `explain`.
+
+    Returns:
+        (ny, nx) bool.
+    """
     if not raised.any():
         return np.zeros(raised.shape, dtype=np.bool_)
     parts, count = label(raised, structure=_SQUARE)
@@ -108,8 +144,27 @@ def _in_shadow(raised: BoolArray, residual: FloatArray, cell: float) -> BoolArra
         ~raised, sampling=cell, return_indices=True
     )
     reach = _SHADOW_REACH * top[parts[rows, columns]] + _SHADOW_MARGIN
-    shadow: BoolArray = distance <= reach
+    shadow: BoolArray = hole & (distance <= reach)
+    doubtful = shadow & (distance > _SHADOW_MARGIN)
+    if p_TCs is not None and p_TCs.shape[1] and doubtful.any():
+        height = np.where(raised, tops, 0.0)
+        shadow[doubtful] = ~_shown(doubtful, height, p_TCs, cell)
     return shadow
+
+
+def _shown(
+    cells: BoolArray, height: FloatArray, p_TCs: FloatArray, cell: float
+) -> BoolArray:
+    """Tells which of the cells (n of them) pictures should have shown."""
+    rows, columns = np.nonzero(cells)
+    p_TQs = cell * np.column_stack([columns + 0.5, rows + 0.5])
+    every = math.ceil(p_TCs.shape[1] / _MOST_EYES)
+    eyes = p_TCs.T[::every]
+    eyes = eyes[eyes[:, 2] > height.max()]
+    aside = np.abs(eyes[:, None, :2] - p_TQs[None]).max(axis=2)
+    shown = aside <= _SURE_VIEW * eyes[:, 2:]
+    shown &= seen_from(eyes, p_TQs, height, cell=cell)
+    return np.asarray(shown.sum(axis=0) * every >= _SURE_PICTURES)
 
 
 def _box_area(window: tuple[slice, slice]) -> int:

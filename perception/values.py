@@ -46,6 +46,7 @@ class SurfaceMap(FrozenValue):
         counts: (N,) int64, depth pixels fused into the point.
         variances: (N,) float32, m², of the depth along the map's z axis.
         frames: Depth images fused so far.
+        p_WCs: (3, frames) float64, m, in W: where they were taken; empty = unknown.
     """
 
     p_WQs: FloatArray
@@ -53,6 +54,7 @@ class SurfaceMap(FrozenValue):
     counts: IntArray
     variances: npt.NDArray[np.float32]
     frames: int
+    p_WCs: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((3, 0)))
 
     @classmethod
     def empty(cls) -> Self:

@@ -37,7 +37,7 @@ class VoxelMap(FrozenValue):
         frames: (N,) int64, pictures that had such a point.
         sums: (4, N) float64, m and m²: sums of x, y, z and z² of the points in V.
         camera_sums: (3, N) float32, m: sum over `frames` of the camera's origin in V.
-        frame_count: Pictures fused so far.
+        p_WCs: (3, n) float64, m, in W: where the n pictures fused so far were taken.
     """
 
     X_WV: RigidTransform
@@ -49,7 +49,7 @@ class VoxelMap(FrozenValue):
     frames: IntArray
     sums: FloatArray
     camera_sums: npt.NDArray[np.float32]
-    frame_count: int
+    p_WCs: FloatArray
 
     @classmethod
     def empty(
@@ -77,8 +77,13 @@ class VoxelMap(FrozenValue):
             frames=np.zeros(0, dtype=np.int64),
             sums=np.zeros((4, 0)),
             camera_sums=np.zeros((3, 0), dtype=np.float32),
-            frame_count=0,
+            p_WCs=np.zeros((3, 0)),
         )
+
+    @property
+    def frame_count(self) -> int:
+        """Pictures fused so far."""
+        return int(self.p_WCs.shape[1])
 
     def fuse(self, p_WQs: FloatArray, p_WC: FloatArray) -> Self:
         """Adds the points of one picture.
@@ -118,7 +123,7 @@ class VoxelMap(FrozenValue):
             frames=merged_frames,
             sums=merged_sums,
             camera_sums=merged_camera_sums,
-            frame_count=self.frame_count + 1,
+            p_WCs=np.column_stack([self.p_WCs, p_WC]),
         )
 
     @functools.cached_property
@@ -137,7 +142,7 @@ class VoxelMap(FrozenValue):
         real &= counts >= share * self._best_around(column, counts)
         real &= frames >= share * self._best_around(column, frames)
         if not real.any():
-            return dataclasses.replace(SurfaceMap.empty(), frames=self.frame_count)
+            return SurfaceMap.empty().replace(frames=self.frame_count, p_WCs=self.p_WCs)
         mean = sums[:, real] / counts[real]
         p_WQs = self.X_WV @ mean[:3]
         p_WCs = self.X_WV @ (camera_sums[:, real] / frames[real])
@@ -149,6 +154,7 @@ class VoxelMap(FrozenValue):
             counts=counts[real],
             variances=np.maximum(mean[3] - mean[2] ** 2, 0.0).astype(np.float32),
             frames=self.frame_count,
+            p_WCs=self.p_WCs,
         )
 
     @property

@@ -82,6 +82,7 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
             tile=scenario.tile,
             scan=scenario.scan,
             motion=scenario.motion,
+            cell=scenario.segmentation.cell,
             standoff=scenario.raster.standoff,
             period=period,
         ),
@@ -118,6 +119,7 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
     wall_port = finder.GetOutputPort("result")
     for system in (accumulator, mover):
         connect(wall_port, system.GetInputPort("wall"))
+    connect(accumulator.GetOutputPort("surface_map"), mover.GetInputPort("surface_map"))
     # The wall becomes a program.
     connect(
         segmenter.GetOutputPort("result"), spray_planner.GetInputPort("segmentation")

@@ -195,6 +195,10 @@ class ScanConfig:
         speed: Camera speed on the rows, m/s.
         overlap: Share of a picture's height that neighbouring rows share.
         margin: How far beyond the tile's edge the pictures reach, m.
+        more_looks: After the scan, at most so many looks into the shadows that it has
+            left.
+        more_look_time: How long the arm holds still for each of them, s: two pictures,
+            those before and after not counted.
     """
 
     look_distance: float = 0.6
@@ -203,10 +207,17 @@ class ScanConfig:
     speed: float = 0.25
     overlap: float = 0.3
     margin: float = 0.05
+    more_looks: int = 4
+    more_look_time: float = 0.4
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
-        check_positive("scan", **dataclasses.asdict(self))
+        values = dataclasses.asdict(self)
+        looks = values.pop("more_looks")
+        check_positive("scan", **values)
+        # They are tried in every order to find the shortest.
+        if not 0 <= looks <= 6:
+            raise ValueError(f"scan.more_looks must be 0 to 6, got {looks!r}.")
         if self.overlap >= 0.9:
             raise ValueError(f"scan.overlap must be < 0.9, got {self.overlap!r}.")
 

@@ -20,7 +20,7 @@ from perception.values import FloatArray, FrozenValue
 
 _HFOV = np.deg2rad(87.0)
 _VFOV = np.deg2rad(58.0)
-_BASELINE = 0.050  # m; the left edge of a stereo depth image is blind for so much.
+BASELINE = 0.050  # m; the left edge of a stereo depth image is blind for so much.
 _ROW_STEP = 0.01  # m, between the row heights that are tried.
 _POINT_STEP = 0.02  # m, between the places on a row that are looked at.
 _DISTANCE_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8)  # Of the scan distance, tried in turn.
@@ -52,7 +52,7 @@ def view_at(distance: float) -> View:
     """
     half_width = float(distance * np.tan(_HFOV / 2.0))
     half_height = float(distance * np.tan(_VFOV / 2.0))
-    return View(half_width - _BASELINE, half_width, half_height)
+    return View(half_width - BASELINE, half_width, half_height)
 
 
 def nozzle_under_camera(p_TCs: FloatArray, gun: SquareGun) -> FloatArray:
@@ -120,7 +120,7 @@ def look_poses(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatA
     x, y = np.meshgrid(centre_T[0] + ticks, centre_T[1] + ticks)
     p_TCs = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, scan.look_distance)])
     p_TGs = nozzle_under_camera(p_TCs, linker.gun)
-    good = _standable(p_TGs, linker)
+    good = standable(p_TGs, linker)
     if not good.any():
         raise ReachError(
             f"look: no clear pose with the camera {scan.look_distance:.2f} m before "
@@ -217,7 +217,7 @@ def _row_heights(
     x = np.linspace(left, right, int((right - left) / _POINT_STEP) + 2)
 
     def clear(height: float) -> bool:
-        return bool(_standable(_row_points(x, height, scan, linker), linker).all())
+        return bool(standable(_row_points(x, height, scan, linker), linker).all())
 
     if all(clear(height) for height in even):
         return even
@@ -267,8 +267,8 @@ def _row_points(
     return nozzle_under_camera(p_TCs, linker.gun)
 
 
-def _standable(p_TGs: FloatArray, linker: Linker) -> np.ndarray:
-    """Returns (n,) bool: where the arm reaches and keeps clear."""
+def standable(p_TGs: FloatArray, linker: Linker) -> np.ndarray:
+    """Returns (n,) bool: at which nozzle places (n, 3) the arm keeps clear."""
     q = linker.gun.solve(p_TGs)
     good = linker.limits.contains(q)
     good[good] = linker.space.free(q[good])

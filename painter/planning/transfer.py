@@ -12,11 +12,13 @@ from painter.planning.gun_path import SquareGun
 from painter.planning.joint_motion import Segment, chain, planning_limits
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.linker import Linker
+from painter.planning.more_looks import more_looks
 from painter.planning.obstacles import ClearSpace, wall_box
 from painter.planning.reach import require_reach, tile_points
 from painter.planning.scan_path import look_segments, scan_segments
 from painter.planning.spray_path import Motion
 from painter.planning.verify import verify_motion
+from perception.shadows import Relief
 from perception.values import FloatArray
 
 GOALS = ("home", "look", "scan", "retract")
@@ -86,6 +88,76 @@ def plan_transfer(
         path = look_segments(q0, tile, scan, linker)
     else:
         path = linker.transit(q0, linker.q_home)
+    return _verified(path, kinematics, limits, space, motion, what=f"motion {goal!r}")
+
+
+def plan_more_looks(
+    q0: FloatArray,
+    *,
+    relief: Relief,
+    X_WT: RigidTransform,
+    kinematics: ArmKinematics,
+    limits: ArmLimits,
+    checker: CollisionChecker,
+    tile: TileConfig,
+    scan: ScanConfig,
+    motion: MotionConfig,
+) -> Motion | None:
+    """Plans looks at wall that the scan has left in shadow.
+
+    The arm keeps the clearance from the highest thing that the scan has found, and no
+    less from the wall than in the scan.
+
+    Args:
+        q0: (5,) rad, where the arm stands, at rest.
+        relief: What the scan has found.
+        X_WT: Tile frame T in W, as found.
+        kinematics: Of the arm.
+        limits: Of its joints.
+        checker: Of the robot's cell: arm, frame and floor.
+        tile: Size of the tile.
+        scan: Settings of the looks.
+        motion: Settings of the motion.
+
+    Returns:
+        The motion, verified; None if nothing is worth a look, or the arm stands nearer
+        to the wall than what was found on it is high.
+
+    Raises:
+        MotionLimitError: The finished motion fails its verification.
+        CollisionError: The same, for its clearance.
+    """
+    if not relief.hidden.any():
+        return None
+    keepout = max(motion.wall_keepout, float(relief.height.max()))
+    try:
+        space = _space_around(q0, (keepout,), X_WT, checker, tile, motion)
+    except CollisionError:
+        return None
+    linker = Linker(
+        gun=SquareGun(kinematics, X_WT),
+        limits=planning_limits(limits, motion.limit_share),
+        space=space,
+        q_home=np.deg2rad(motion.home_deg),
+    )
+    path = more_looks(q0, relief, scan, linker)
+    if not path:
+        return None
+    return _verified(
+        path, kinematics, limits, space, motion, what="motion 'more looks'"
+    )
+
+
+def _verified(
+    path: Sequence[Segment],
+    kinematics: ArmKinematics,
+    limits: ArmLimits,
+    space: ClearSpace,
+    motion: MotionConfig,
+    *,
+    what: str,
+) -> Motion:
+    """Chains the segments and looks at the outcome once more."""
     planned = chain(path, period=motion.sample_period)
     verify_motion(
         planned,
@@ -93,7 +165,7 @@ def plan_transfer(
         limits=limits,
         limit_share=motion.limit_share,
         space=space,
-        what=f"motion {goal!r}",
+        what=what,
     )
     return planned
 

@@ -31,7 +31,7 @@ from perception.values import FrozenValue
 class Action(enum.Enum):
     """What a step of the sequence does."""
 
-    MOVE = "plans a motion with the motion planner and follows it"
+    MOVE = "plans a motion with the motion planner and follows it, if there is one"
     HOLD = "stands still while the camera looks"
     WORK = "asks a stage for its result"
     REVIEW = "waits for the operator's approval"
@@ -53,6 +53,7 @@ SEQUENCE = (
     Step(Phase.LOOK, Action.HOLD),
     Step(Phase.LOOK, Action.WORK, "wall_finder"),
     Step(Phase.SCAN, Action.MOVE, "scan"),
+    Step(Phase.SCAN, Action.MOVE, "more looks"),
     Step(Phase.SEGMENT, Action.WORK, "wall_segmenter"),
     Step(Phase.PLAN, Action.WORK, "spray_path_planner"),
     Step(Phase.REVIEW, Action.REVIEW),
@@ -361,7 +362,7 @@ class PaintCycle(LeafSystem):
             goal=now.request.goal,
             compute_s=result.compute_time,
         )
-        if step.action == Action.MOVE:
+        if step.action == Action.MOVE and result.value is not None:
             return self._Moving(now, result, time, spray=False)
         return self._Entered(now, now.step + 1, time)
 

@@ -84,5 +84,6 @@ class WallSegmenter(Stage):
             seed=self._seed,
             counts=surface_map.counts,
             variances=surface_map.variances.astype(np.float64),
+            p_WCs=surface_map.p_WCs,
             up_W=UP_W,
         )

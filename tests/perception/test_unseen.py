@@ -7,8 +7,9 @@ from perception.unseen import Reason, close_gaps, explain
 CELL = 0.01
 
 
-def explained(reason, residual, hole):
-    return explain(reason, np.where(hole, np.nan, residual), hole, cell=CELL)
+def explained(reason, residual, hole, **settings):
+    residual = np.where(hole, np.nan, residual)
+    return explain(reason, residual, hole, cell=CELL, **settings)
 
 
 def test_a_hole_beside_something_raised_is_its_shadow_and_farther_off_unseen():
@@ -21,6 +22,27 @@ def test_a_hole_beside_something_raised_is_its_shadow_and_farther_off_unseen():
     result = explained(reason, residual, hole)
     assert (result[20:30, 15:20] == Reason.SHADOW).all()
     assert (result[50:55, 50:55] == Reason.UNSEEN).all()
+
+
+def test_a_pane_beside_a_box_is_told_from_its_shadow_by_where_the_pictures_were_taken():
+    reason = np.zeros((100, 100), dtype=np.int64)
+    residual = np.zeros(reason.shape)
+    reason[40:60, 40:60], residual[40:60, 40:60] = Reason.RAISED, 0.1
+    hole = np.zeros(reason.shape, dtype=bool)
+    hole[40:60, 20:38] = True  # 20 x 18 cm to the left of it
+
+    def seen_from_x(x):
+        return explained(
+            reason, residual, hole, p_TCs=np.tile([[x], [0.5], [0.7]], 10)
+        )[40:60, 20:38]
+
+    # From x = 0.58 the box, its edge at x = 0.4, hides 0.1 * 0.18 / 0.6 = 3 cm of wall.
+    near = seen_from_x(0.58)
+    assert (near[:, -1] == Reason.SHADOW).all()
+    assert (near[:, 3:-2] == Reason.GLASS).all()
+    # From the left it hides nothing; from afar on the right as much as its height may.
+    assert (seen_from_x(0.2) == Reason.GLASS).all()
+    assert (seen_from_x(1.2)[:, 3:] == Reason.SHADOW).all()
 
 
 def test_holes_in_a_frame_and_large_rectangles_are_glass():

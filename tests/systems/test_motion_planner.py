@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
@@ -12,11 +13,12 @@ from painter.diagrams.arm_model import (
     MakeCollisionChecker,
 )
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
+from painter.planning.gun_path import SquareGun
 from painter.planning.spray_path import Motion
 from painter.planning.tile import nominal_tile_pose
 from painter.systems.motion_planner import MotionPlanner
 from painter.systems.values import StageRequest, StageResult
-from perception.values import Wall
+from perception.values import SurfaceMap, Wall
 
 DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"
 HOME = np.deg2rad(MotionConfig().home_deg)
@@ -40,7 +42,7 @@ def planner():
     return make_planner()
 
 
-def ask(dut, goal, *, wall=None, q=HOME, stage="motion_planner"):
+def ask(dut, goal, *, wall=None, q=HOME, stage="motion_planner", points=None):
     """The stage's answer to one request."""
     simulator = Simulator(dut)
     context = simulator.get_mutable_context()
@@ -48,6 +50,9 @@ def ask(dut, goal, *, wall=None, q=HOME, stage="motion_planner"):
     dut.GetInputPort("request").FixValue(context, request)
     dut.GetInputPort("state").FixValue(context, np.concatenate([q, np.zeros(5)]))
     dut.GetInputPort("wall").FixValue(context, wall or StageResult())
+    if points is not None:
+        surface_map = SurfaceMap.empty().replace(p_WQs=points)
+        dut.GetInputPort("surface_map").FixValue(context, Value(surface_map))
     simulator.AdvanceTo(0.05)  # One look at the request, at t = 0.
     return dut.GetOutputPort("result").Eval(context)
 
@@ -71,6 +76,25 @@ def test_scan_follows_the_wall_found(planner):
     np.testing.assert_allclose(camera_x, [1.05 - 0.7, 1.08 - 0.7], atol=1e-3)
 
 
+def test_more_looks_go_to_what_the_map_lacks_beside_a_box(planner):
+    x, y = np.meshgrid(np.arange(0.0025, 2.0, 0.005), np.arange(0.0025, 2.0, 0.005))
+    box = (abs(x - 0.3) < 0.1) & (abs(y - 1.0) < 0.1)
+    shadow = (x > 0.13) & (x < 0.2) & (abs(y - 1.0) < 0.1)
+    X_WT = nominal_tile_pose(TileConfig())
+    gun = SquareGun(GetArmKinematics(MakeArmPlant(DIRECTIVES)), X_WT)
+    (q,) = gun.solve(np.array([[1.4, 0.4, 0.5]]))
+    ends = []
+    for gap in (shadow, np.zeros_like(shadow)):
+        p_TQs = np.stack([x, y, np.where(box, 0.1, 0.0)])[:, ~gap]
+        result = ask(planner, "more looks", q=q, points=X_WT @ p_TQs)
+        assert result.error is None
+        ends.append(result.value)
+    assert ends[1] is None
+    # The camera comes to the box's left: W y grows to the left from the tile's middle.
+    _, p_WCs = gun.kinematics.camera_poses(ends[0].q[-1:])
+    assert p_WCs[0, 1] > 1.0 - 0.2
+
+
 def test_tile_out_of_reach_is_an_error_result_that_says_so():
     result = ask(make_planner(width=3.0), "look")
     assert result.value is None
@@ -78,7 +102,7 @@ def test_tile_out_of_reach_is_an_error_result_that_says_so():
 
 
 def test_unknown_goal_is_an_error_result(planner):
-    assert "home, look, scan, retract, got 'dance'" in ask(planner, "dance").error
+    assert "retract, more looks, got 'dance'" in ask(planner, "dance").error
 
 
 def test_requests_to_others_are_left_alone(planner):

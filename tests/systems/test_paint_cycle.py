@@ -34,16 +34,19 @@ def still_motion(spray_on=()) -> Motion:
 
 
 class ScriptedStage(Stage):
-    """Answers with a value, or fails."""
+    """Answers with a value, by the goal if it has several, or fails."""
 
     def __init__(self, stage: str, answer) -> None:
         super().__init__(stage=stage, period=0.02)
         self._answer = answer
 
     def _Work(self, context, goal):
-        if isinstance(self._answer, Exception):
-            raise self._answer
-        return self._answer
+        answer = self._answer
+        if isinstance(answer, dict):
+            answer = answer.get(goal, answer["else"])
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
 
 
 class Rig:
@@ -167,6 +170,18 @@ def test_a_known_wall_is_painted_without_a_look_at_it():
     assert rig.output(rig.follower, "status").number == 3
 
 
+def test_more_looks_that_nobody_needs_are_left_out():
+    for motion, looks in ((still_motion(), 1), (None, 0)):
+        planner = {"more looks": motion, "else": still_motion()}
+        rig = Rig(motion_planner=planner)
+        rig.advance_to_end()
+        assert rig.phases == ALL
+        times = [time for time, name, _ in rig.status.events if name == "phase"]
+        scan = times[ALL.index("SEGMENT")] - times[ALL.index("SCAN")]
+        # A few decisions of 20 ms come on top.
+        assert scan == pytest.approx((1 + looks) * DURATION, abs=0.2)
+
+
 def test_camera_is_wanted_in_look_and_scan_alone():
     rig = Rig()
     wanted = set()
@@ -214,8 +229,8 @@ def test_abort_closes_the_gun_stands_and_retracts():
     rig.advance_to_end()
     assert rig.phases[-1] == "ABORTED"
     assert "operator" in rig.status.cause
-    # The retract motion ran: HOME, LOOK, SCAN, PAINT and then the fifth.
-    assert rig.output(rig.follower, "status").number == 5
+    # The retract motion ran: HOME, LOOK, SCAN, more looks, PAINT and then the sixth.
+    assert rig.output(rig.follower, "status").number == 6
 
 
 def test_a_stopped_job_knows_with_which_stroke_it_goes_on():
