@@ -2,6 +2,8 @@
 
 python -m benchmarks.cycles --out runs/cycles            # the named scenes
 python -m benchmarks.cycles --out runs/cycles --seeds 20 # and random ones
+
+With --keep a run that is there is not repeated: what was broken off goes on.
 """
 
 import argparse
@@ -39,12 +41,19 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1, help="random scenes 1 to N")
     parser.add_argument("--jobs", type=int, default=1, help="runs at a time")
     parser.add_argument("--set", nargs="*", default=[], help="KEY=VALUE over all")
+    parser.add_argument(
+        "--keep", action="store_true", help="keep runs that are there, settings or not"
+    )
     arguments = parser.parse_args()
     jobs = [(scene, 1) for scene in arguments.scenes]
     jobs += [("random", seed) for seed in range(1, arguments.seeds + 1)]
 
     def run(job: tuple[str, int]) -> dict[str, Any]:
-        return simulate(*job, arguments.out, arguments.set)
+        folder = arguments.out / f"{job[0]}-{job[1]}"
+        report = folder / "report.json"
+        if not (arguments.keep and report.is_file()):
+            simulate(*job, folder, arguments.set)
+        return json.loads(report.read_text())
 
     rows = []
     print("| scene | " + " | ".join((*FIGURES, *TIMING)) + " |")
@@ -68,9 +77,8 @@ def main() -> None:
             print(row(f"random, {name}", summary))
 
 
-def simulate(scene: str, seed: int, out: Path, settings: list[str]) -> dict[str, Any]:
-    """Runs `painter simulate` in a process of its own; returns report.json."""
-    folder = out / f"{scene}-{seed}"
+def simulate(scene: str, seed: int, folder: Path, settings: list[str]) -> None:
+    """Runs `painter simulate` in a process of its own."""
     painter = Path(sys.executable).with_name("painter")
     words = [word for setting in settings for word in ("--set", setting)]
     subprocess.run(
@@ -79,7 +87,6 @@ def simulate(scene: str, seed: int, out: Path, settings: list[str]) -> dict[str,
         capture_output=True,
         check=False,  # A cycle that ends in FAULT is a row, too.
     )
-    return json.loads((folder / "report.json").read_text())
 
 
 def row(name: str, figures: dict[str, Any]) -> str:
