@@ -14,7 +14,8 @@ from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.deposition import half_axes
 from painter.planning.film_cost import FilmCost, stroke_cost
 from painter.planning.film_fit import FilmFit, Span
-from painter.planning.film_model import FilmModel, Site
+from painter.planning.film_model import FilmModel, Line, Site
+from painter.planning.leaning import leaning_lines
 from perception.values import BoolArray, FloatArray, IntArray
 
 _SPACING = 0.02  # m, between candidate lines ...
@@ -60,18 +61,20 @@ def find_cut_ins(
     places = np.linspace(0.0, width, round(width / spacing) + 1)[1:-1]
     fan = round(2.0 * half_axes(tip, raster.standoff)[0] / site.cell)
     beside = _worth_a_stroke(site, fan) if where is None else where
+    lines = [
+        (0.0, places),
+        *leaning_lines(site, 2.0 * half_axes(tip, near)[0], spacing),
+    ]
+    candidates = [
+        _Candidate(float(place), lean, standoff, room)
+        for standoff, (lean, x) in itertools.product(standoffs, lines)
+        for place, room in zip(x, fit.room(x, standoff, lean).T, strict=True)
+    ]
     for _ in range(_ROUNDS):
-        found: list[tuple[float, float, list[Span]]] = []
-        for standoff in standoffs:
-            a, _ = half_axes(tip, standoff)
-            found += [
-                (gain, a, spans)
-                for gain, spans in _best_spans(
-                    fit, model, places, standoff, beside, raster
-                )
-            ]
+        found = _best_spans(candidates, fit, model, beside, raster)
         taken: list[tuple[float, list[Span]]] = []
-        for gain, a, spans in sorted(found, key=lambda item: -item[0]):
+        for gain, spans in sorted(found, key=lambda item: -item[0]):
+            a, _ = half_axes(tip, spans[0].standoff)
             if gain > 0.0 and not any(_meet(spans, a, *other) for other in taken):
                 taken.append((a, spans))
                 for span in spans:
@@ -96,64 +99,109 @@ def _worth_a_stroke(site: Site, fan: int) -> BoolArray:
 
 def _meet(spans: list[Span], a: float, other_a: float, others: list[Span]) -> bool:
     """Returns whether spans of one line touch the film of another's."""
-    apart = abs(spans[0].x - others[0].x) >= _APART * 0.5 * (a + other_a)
-    return not apart and any(
-        one.low < other.high and other.low < one.high
-        for one in spans
-        for other in others
-    )
+    apart = _APART * 0.5 * (a + other_a)
+    for one, other in itertools.product(spans, others):
+        low, high = max(one.low, other.low), min(one.high, other.high)
+        if low < high:
+            gaps = [one.x_at(y) - other.x_at(y) for y in (low, high)]
+            if max(gaps) > -apart and min(gaps) < apart:
+                return True
+    return False
+
+
+class _Candidate:
+    """A line on which to cut in, and what each flow on each row would cost."""
+
+    def __init__(self, x: float, lean: float, standoff: float, room: BoolArray) -> None:
+        self.x, self.lean, self.standoff = x, lean, standoff
+        self._room = room
+        self._film: FloatArray | None = None
+        self._table: FloatArray | None = None
+
+    def table(
+        self, fit: FilmFit, model: FilmModel, beside: BoolArray, raster: RasterConfig
+    ) -> FloatArray | None:
+        """Returns costs (ny, flows), m², or None where nothing on the line is thin.
+
+        They are found anew only where the film under the line has changed.
+        """
+        line = model.line(self.x, self.standoff, self.lean)
+        window = slice(*line.columns)
+        film = fit.film[:, window]
+        if self._film is None or not np.array_equal(film, self._film):
+            self._film = film.copy()
+            self._table = self._costs(line, film, window, model.site, beside, raster)
+        return self._table
+
+    def _costs(
+        self,
+        line: Line,
+        film: FloatArray,
+        window: slice,
+        site: Site,
+        beside: BoolArray,
+        raster: RasterConfig,
+    ) -> FloatArray | None:
+        wanted = site.wanted[:, window]
+        thin = wanted & (film < _THIN) & beside[:, window] & (line.film > 0.0)
+        rows = thin.any(axis=1)
+        if rows.sum() * site.cell < raster.min_stroke:
+            return None
+        flows = self.flows(raster)
+        table = np.zeros((rows.size, flows.size))
+        trial = film[rows] + flows[:, None, None] * line.film[rows]
+        cells = FilmCost.coarse()(trial, wanted[rows], site.clean[rows, window])
+        table[rows] = cells.sum(axis=2).T * site.cell**2
+        table[~rows, 1:] = _NEVER
+        table[~self._room, 1:] = _NEVER
+        table[:, 1:] += (stroke_cost(1.0) - stroke_cost(0.0)) * site.cell
+        return table
+
+    def flows(self, raster: RasterConfig) -> FloatArray:
+        """Returns the flows that are tried."""
+        return np.asarray(_FLOWS * self.standoff / raster.standoff)
+
+    def spans(self, levels: IntArray, site: Site, raster: RasterConfig) -> list[Span]:
+        """Returns the spans of a choice of flows (ny,) by their number."""
+        flows = self.flows(raster)
+        ends = np.flatnonzero(np.diff(levels, prepend=0, append=0) != 0)
+        return [
+            Span(
+                self.x,
+                (a - site.border) * site.cell,
+                (b - site.border) * site.cell,
+                self.standoff,
+                float(min(flows[levels[a]], 1.0)),
+                self.lean,
+            )
+            for a, b in itertools.pairwise(ends)
+            if levels[a] and (b - a) * site.cell >= raster.min_stroke
+        ]
 
 
 def _best_spans(
+    candidates: list[_Candidate],
     fit: FilmFit,
     model: FilmModel,
-    places: FloatArray,
-    standoff: float,
     beside: BoolArray,
     raster: RasterConfig,
 ) -> list[tuple[float, list[Span]]]:
-    """Returns what each candidate line gains, m², and the spans that gain it."""
-    site = model.site
-    cost = FilmCost.coarse()
-    flows = _FLOWS * standoff / raster.standoff
-    tables, used = [], []
-    for x_line, room in zip(places, fit.room(places, standoff).T, strict=True):
-        line = model.line(float(x_line), standoff)
-        window = slice(*line.columns)
-        film, wanted = fit.film[:, window], site.wanted[:, window]
-        rows = (wanted & (film < _THIN) & beside[:, window]).any(axis=1)
-        if rows.sum() * site.cell < raster.min_stroke:
-            continue
-        table = np.zeros((rows.size, flows.size))
-        trial = film[rows] + flows[:, None, None] * line.film[rows]
-        cells = cost(trial, wanted[rows], site.clean[rows, window])
-        table[rows] = cells.sum(axis=2).T * site.cell**2
-        table[~rows, 1:] = _NEVER
-        table[~room, 1:] = _NEVER
-        table[:, 1:] += (stroke_cost(1.0) - stroke_cost(0.0)) * site.cell
-        tables.append(table)
-        used.append(float(x_line))
-    if not tables:
+    """Returns what candidate lines gain, m², and the spans that gain it."""
+    tables = [line.table(fit, model, beside, raster) for line in candidates]
+    lines = [
+        (line, table)
+        for line, table in zip(candidates, tables, strict=True)
+        if table is not None
+    ]
+    if not lines:
         return []
-    levels, gains = _switch(np.stack(tables), stroke_cost(0.0))
-    result = []
-    for x_line, level, gain in zip(used, levels, gains, strict=True):
-        ends = np.flatnonzero(np.diff(level, prepend=0, append=0) != 0)
-        edges = [(a, b) for a, b in itertools.pairwise(ends) if level[a]]
-        spans = [
-            Span(
-                x_line,
-                (a - site.border) * site.cell,
-                (b - site.border) * site.cell,
-                standoff,
-                float(min(flows[level[a]], 1.0)),
-            )
-            for a, b in edges
-            if (b - a) * site.cell >= raster.min_stroke
-        ]
-        if spans:
-            result.append((float(gain), spans))
-    return result
+    costs = np.stack([table for _, table in lines])
+    levels, gains = _switch(costs, stroke_cost(0.0))
+    found = [
+        (float(gain), line.spans(level, model.site, raster))
+        for (line, _), level, gain in zip(lines, levels, gains, strict=True)
+    ]
+    return [(gain, spans) for gain, spans in found if spans]
 
 
 def _switch(cost: FloatArray, begun: float) -> tuple[IntArray, FloatArray]:

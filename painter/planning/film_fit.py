@@ -12,13 +12,17 @@ from scipy.ndimage import maximum_filter
 
 from painter.planning.config import RasterConfig
 from painter.planning.film_cost import FilmCost, stroke_cost
-from painter.planning.film_model import FilmModel
+from painter.planning.film_model import FilmModel, Line
 from perception.values import BoolArray, FloatArray
 
 # Steps across, along (m), of flow (share) and stand-off (m): coarse, then fine.
 _STEPS = ((0.01, 0.01, 0.10, 0.03), (0.004, 0.005, 0.04, 0.0))
 _PASSES = 6  # At most, with steps of one size.
 _REPEATS = 4  # Of a step that helped.
+# A shorter stroke need not lean: its ends move instead. Beyond 0.3 m/m, 17 deg, the
+# fan, which stays level, would be dragged too far along its own axis.
+_SHORTEST_LEANING = 0.15  # m
+MOST_LEAN = 0.3
 _LEAST_FLOW = 0.08  # A valve does not dose less.
 _GAIN = 1e-6  # m², least gain of a step.
 # The gun's half width and the clearance around it, m, and the clearance before it.
@@ -27,13 +31,22 @@ _GUN_FRONT = 0.05
 
 
 class Span(NamedTuple):
-    """A stroke while it is fitted: along T y at `x`; m, flow as share of nominal."""
+    """A stroke while it is fitted; m, flow as share of nominal.
+
+    It goes up from T y `low` to `high`, and by `lean` to the right for each metre up;
+    `x` is where its line meets T y = 0.
+    """
 
     x: float
     low: float
     high: float
     standoff: float
     flow: float
+    lean: float = 0.0
+
+    def x_at(self, y: float) -> float:
+        """Returns the place across at T y, m."""
+        return self.x + self.lean * y
 
 
 class FilmFit:
@@ -65,19 +78,24 @@ class FilmFit:
         self._tops = maximum_filter(site.height, size=size) + _GUN_FRONT
         self._tops[self._tops <= _GUN_FRONT] = 0.0  # The wall has its own clearance.
 
-    def room(self, x: FloatArray, standoff: float) -> BoolArray:
+    def room(self, x: FloatArray, standoff: float, lean: float = 0.0) -> BoolArray:
         """Returns the rows on which the gun clears what stands out.
 
         Args:
-            x: (n,) m, lines.
+            x: (n,) m, lines, where they meet T y = 0.
             standoff: Nozzle to wall, m.
+            lean: Of the lines, m/m.
 
         Returns:
-            (ny, n).
+            (ny, n); False where a line is off the site.
         """
         site = self._model.site
-        columns = np.floor(x / site.cell).astype(int) + site.border
-        return np.asarray(self._tops[:, columns] <= standoff)
+        ny, nx = site.wanted.shape
+        places = x + lean * site.y[:, None]
+        columns = np.floor(places / site.cell).astype(int) + site.border
+        inside = (columns >= 0) & (columns < nx)
+        tops = self._tops[np.arange(ny)[:, None], np.clip(columns, 0, nx - 1)]
+        return np.asarray(inside & (tops <= standoff))
 
     def add(self, span: Span) -> None:
         """Adds a span and its film."""
@@ -102,11 +120,14 @@ class FilmFit:
     ) -> int:
         """Tries steps of one span; returns how many helped."""
         helped = 0
+        span = self.spans[index]
         steps = [("x", across), ("low", along), ("high", along)]
-        near = self.spans[index].standoff < self._raster.standoff
-        if near and standoff:
-            steps.append(("standoff", standoff))
-        steps.append(("flow", flow * self.spans[index].standoff))
+        if span.standoff < self._raster.standoff:
+            if span.high - span.low > _SHORTEST_LEANING:
+                steps.append(("lean", 2.0 * across / (span.high - span.low)))
+            if standoff:
+                steps.append(("standoff", standoff))
+        steps.append(("flow", flow * span.standoff))
         for name, step in steps:
             for signed in (step, -step):
                 if name == "flow":
@@ -122,6 +143,12 @@ class FilmFit:
         """Returns the span with one number varied, or None if it cannot be."""
         raster = self._raster
         trial = span._replace(**{name: getattr(span, name) + step})
+        if name == "lean":
+            # About the middle.
+            middle = 0.5 * (span.low + span.high)
+            trial = trial._replace(x=span.x_at(middle) - trial.lean * middle)
+            if abs(trial.lean) > MOST_LEAN:
+                return None
         if name == "standoff":
             # The flow goes with the fan's width: the film's thickness stays.
             trial = trial._replace(flow=span.flow * trial.standoff / span.standoff)
@@ -135,20 +162,22 @@ class FilmFit:
 
     def _has_room(self, span: Span) -> bool:
         site = self._model.site
-        rows = slice(*(int(y / site.cell) + site.border for y in span[1:3]))
-        column = int(np.floor(span.x / site.cell)) + site.border
-        if not 0 <= column < site.wanted.shape[1]:
+        nx = site.wanted.shape[1]
+        rows = np.arange(*(self._row(y) for y in span[1:3]))
+        places = span.x + span.lean * site.y[rows]
+        columns = np.floor(places / site.cell).astype(int) + site.border
+        if columns.size == 0 or columns.min() < 0 or columns.max() >= nx:
             return False
-        return bool((self._tops[rows, column] <= span.standoff).all())
+        return bool((self._tops[rows, columns] <= span.standoff).all())
 
     def _try(self, index: int, trial: Span) -> bool:
         """Takes the trial for the span if it costs less."""
         span = self.spans[index]
         old, new = self._rows(span), self._rows(trial)
         first, end = min(old.start, new.start), max(old.stop, new.stop)
-        if trial.x == span.x and trial.flow == span.flow:
+        if trial.x == span.x and trial.flow == span.flow and trial.lean == span.lean:
             # Only one end has moved: the film beyond its blur is as it was.
-            line = self._model.line(span.x, span.standoff)
+            line = self._line(span)
             ends = (trial.low, span.low) if trial.low != span.low else ()
             ends = ends or (trial.high, span.high)
             first = max(first, self._row(min(ends) - line.blur))
@@ -195,13 +224,16 @@ class FilmFit:
         cost = self._cost(film, site.wanted[rows, columns], site.clean[rows, columns])
         return float(cost.sum()) * site.cell**2
 
+    def _line(self, span: Span) -> Line:
+        return self._model.line(span.x, span.standoff, span.lean)
+
     def _row(self, y: float) -> int:
         site = self._model.site
         row = int(np.floor(y / site.cell)) + site.border
         return int(min(max(row, 0), site.wanted.shape[0]))
 
     def _rows(self, span: Span) -> slice:
-        blur = self._model.line(span.x, span.standoff).blur
+        blur = self._line(span).blur
         return slice(self._row(span.low - blur), self._row(span.high + blur) + 1)
 
     def _patch(
@@ -209,7 +241,7 @@ class FilmFit:
     ) -> tuple[slice, slice, FloatArray]:
         """Returns a span's film on the rows and columns that it reaches."""
         rows = rows or self._rows(span)
-        line = self._model.line(span.x, span.standoff)
-        passed = self._model.passed(line, self._model.site.y[rows], span.low, span.high)
+        line = self._line(span)
+        passed = self._model.passed(line, rows, span.low, span.high)
         film = span.flow * line.film[rows] * passed
         return rows, slice(*line.columns), film

@@ -2,8 +2,9 @@
 
 `deposition` gives the film on a bare plane. Here the fan lands on a height field, row
 by row: along the fan's long axis a ray lands on the first column in its way, in closed
-form, and across it the fan's thickness blurs the stroke's ends. Film is given as a
-share of the nominal film.
+form, and across it the fan's thickness blurs the stroke's ends. A stroke may lean, its
+fan stays level: each row sees the same fan at another place. Film is given as a share
+of the nominal film.
 """
 
 import functools
@@ -90,7 +91,7 @@ class Line(FrozenValue):
     Attributes:
         columns: First and end column of the window.
         film: (ny, n) film of an endless stroke with full flow.
-        thickness: (n,) m, half the fan's thickness at each column.
+        thickness: (ny, n) m, half the fan's thickness as it passes over each cell.
     """
 
     columns: tuple[int, int]
@@ -123,77 +124,97 @@ class FilmModel:
         self._speed = speed
         self._cdf = betainc(tip.gamma + 1.0, tip.gamma + 1.0, 0.5 + 0.5 * _TABLE)
         self._across = betainc(tip.beta2, tip.beta2, 0.5 + 0.5 * _TABLE)
-        self._lines: dict[tuple[float, float], Line] = {}
+        self._lines: dict[tuple[float, float, float], Line] = {}
 
-    def line(self, x_line: float, standoff: float) -> Line:
-        """Returns the line at `x_line`, m in T, sprayed from `standoff`, m."""
-        key = (round(x_line, 4), round(standoff, 4))
+    def line(self, x_line: float, standoff: float, lean: float = 0.0) -> Line:
+        """Returns a line.
+
+        Args:
+            x_line: Where it meets T y = 0, m in T.
+            standoff: From which it is sprayed, m.
+            lean: By how much it goes to the right in going up, m/m.
+        """
+        key = (round(x_line, 4), round(standoff, 4), round(lean, 4))
         if key not in self._lines:
             self._lines[key] = self._make_line(*key)
         return self._lines[key]
 
-    def passed(self, line: Line, y: FloatArray, low: float, high: float) -> FloatArray:
+    def passed(self, line: Line, rows: slice, low: float, high: float) -> FloatArray:
         """Returns the share of a line's film that a stroke of it leaves.
 
         Args:
             line: The line.
-            y: (k,) m, rows.
-            low: Where the stroke begins or ends, m.
-            high: Where it ends or begins, m.
+            rows: Those of the site that are looked at, k of them.
+            low: Where the stroke begins or ends, m in T y.
+            high: Where it ends or begins, m in T y.
 
         Returns:
             (k, n): the share of the fan's thickness that has passed over each cell.
         """
-        ends = [(y[:, None] - end) / line.thickness for end in (low, high)]
-        below, above = (np.interp(end, _TABLE, self._across) for end in ends)
+        y, thickness = self.site.y[rows][:, None], line.thickness[rows]
+        below, above = (
+            np.interp((y - end) / thickness, _TABLE, self._across)
+            for end in (low, high)
+        )
         return np.asarray(below - above)
 
     def film(self, strokes: Sequence[Stroke]) -> FloatArray:
         """Returns the film of strokes on the site, (ny, nx), as share of nominal."""
         film = np.zeros(self.site.wanted.shape)
+        every = slice(0, self.site.y.size)
         for stroke in strokes:
-            line = self.line(float(stroke.start_T[0]), stroke.standoff)
-            low, high = sorted((float(stroke.start_T[1]), float(stroke.end_T[1])))
-            share = self.passed(line, self.site.y, low, high)
+            x, y = (float(value) for value in stroke.start_T)
+            x_end, y_end = (float(value) for value in stroke.end_T)
+            lean = (x_end - x) / (y_end - y)
+            line = self.line(x - lean * y, stroke.standoff, lean)
+            share = self.passed(line, every, min(y, y_end), max(y, y_end))
             scale = stroke.flow * self._speed / stroke.speed
             film[:, slice(*line.columns)] += scale * line.film * share
         return film
 
-    def _make_line(self, x_line: float, standoff: float) -> Line:
+    def _make_line(self, x_line: float, standoff: float, lean: float) -> Line:
         site, cell = self.site, self.site.cell
         a, b = half_axes(self._tip, standoff)
-        middle = int(np.floor(x_line / cell)) + site.border
+        ny, count = site.wanted.shape
+        axis = x_line + lean * site.y
+        middle = np.floor(axis / cell).astype(int) + site.border
         # What lies back is reached by rays that went past the fan's width on the wall.
         spread = 1.0 - min(float(site.height.min()), 0.0) / standoff
         reach = int(np.ceil(spread * a / cell)) + 1
-        count = site.wanted.shape[1]
-        first, end = max(middle - reach, 0), min(middle + reach + 1, count)
         # Rows that are as the one below them are looked at once.
-        height = site.height[:, first:end]
-        new = np.append(True, (height[1:] != height[:-1]).any(axis=1))
+        columns = middle[:, None] + np.arange(-reach, reach + 1)
+        height = site.height[np.arange(ny)[:, None], np.clip(columns, 0, count - 1)]
+        parts = np.column_stack([height, axis])
+        new = np.append(True, (parts[1:] != parts[:-1]).any(axis=1))
         back = np.cumsum(new) - 1
         drop = np.maximum(standoff - height[new], 1e-6)
-        edges = (np.arange(first, end + 1) - site.border) * cell - x_line
-        # The steepest ray that has landed by each column's far edge, on either side;
-        # a column higher than the nozzle stops them all.
-        split = min(max(middle - first, 0), end - first)
+        first_edge = (columns[new, :1] - site.border) * cell - axis[new, None]
+        edges = first_edge + cell * np.arange(2 * reach + 2)
+        # The steepest ray that has landed by each column's far edge, on either side of
+        # the axis; a column higher than the nozzle stops them all.
+        right = self._landed(edges[:, reach + 1 :], drop[:, reach:], standoff / a)
+        left = self._landed(-edges[:, reach::-1], drop[:, reach::-1], standoff / a)
         share = np.zeros_like(drop)
-        right = self._landed(edges[split + 1 :], drop[:, split:], standoff / a)
-        left = self._landed(
-            -edges[: split + 1][::-1], drop[:, : split + 1][:, ::-1], standoff / a
-        )
-        share[:, split:] += right
-        share[:, : split + 1] += left[:, ::-1]
-        centres = site.x[first:end] - x_line
-        thin = b * np.sqrt(np.clip(1.0 - (centres / a) ** 2, 1e-4, None))
-        film = share[back] * (self._dose / cell)
+        share[:, reach:] += right
+        share[:, reach::-1] += left
+        # Leaning, a metre of the stroke is less than a metre up.
+        share *= np.hypot(1.0, lean) * self._dose / cell
+
+        first = int(np.clip(middle.min() - reach, 0, count - 1))
+        end = int(np.clip(middle.max() + reach + 1, first + 1, count))
+        film = np.zeros((ny, end - first))
+        inside = (columns >= first) & (columns < end)
+        row, _ = np.nonzero(inside)
+        film[row, columns[inside] - first] = share[back][inside]
+        offset = (site.x[first:end] - axis[:, None]) / a
+        thin = b * np.sqrt(np.clip(1.0 - offset**2, 1e-4, None))
         return Line((first, end), film, thin)
 
     def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:
         """Returns the flow's share on each column outwards from the spray axis.
 
         Args:
-            far: (n,) m, far edges of the columns.
+            far: (k, n) m, far edges of the columns.
             drop: (k, n) m, nozzle over each column.
             scale: From a ray's slope to the fan's coordinate u.
         """

@@ -126,24 +126,25 @@ def fitted_strokes(
         if (
             last is not None
             and abs(span.x - last.x) < _SAME_LINE
-            and (span.standoff, span.flow) == (last.standoff, last.flow)
+            and span[3:] == last[3:]
             and span.low - last.high < gap
         ):
             joined[-1] = last._replace(high=max(last.high, span.high))
         else:
             joined.append(span)
-    places = sorted({round(span.x, 3) for span in joined})
+    across = [round(span.x_at(0.5 * (span.low + span.high)), 3) for span in joined]
+    places = sorted(set(across))
     return tuple(
         Stroke(
-            start_T=np.array([span.x, span.low]),
-            end_T=np.array([span.x, span.high]),
+            start_T=np.array([span.x_at(span.low), span.low]),
+            end_T=np.array([span.x_at(span.high), span.high]),
             speed=raster.speed,
             kind="body" if span.standoff == raster.standoff else "cut_in",
-            column=places.index(round(span.x, 3)),
+            column=places.index(place),
             standoff=span.standoff,
             flow=min(span.flow, 1.0),
         )
-        for span in joined
+        for span, place in zip(joined, across, strict=True)
     )
 
 
