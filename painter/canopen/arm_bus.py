@@ -80,7 +80,8 @@ class ArmBus:
         self._next_heartbeat = 0.0
         self._last_cycle: float | None = None
         self._now = 0.0
-        self._counts = dict.fromkeys(("cycles", "overruns", "missing", "foreign"), 0)
+        counted = ("cycles", "overruns", "missing", "foreign", "malformed")
+        self._counts = dict.fromkeys(counted, 0)
         self._meter = LoadMeter(bus.bitrate)
 
     @property
@@ -366,8 +367,8 @@ class ArmBus:
         node = self._by_id.get(frame.cob_id & 0x7F)
         if node is None or frame.cob_id < SYNC_ID:
             self._counts["foreign"] += 1
-        else:
-            node.take(frame, now)
+        elif not node.take(frame, now):
+            self._counts["malformed"] += 1
 
     def _send(self, frame: Frame) -> None:
         if self._is_lost:

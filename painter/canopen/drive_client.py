@@ -84,7 +84,7 @@ class DriveClient(NodeClient):
         self.is_homed = False
         self.is_homing = False
 
-    def take_process_data(self, kind: int, data: bytes) -> None:
+    def take_process_data(self, kind: int, data: bytes) -> bool:
         """Takes TPDO1 (6041h, 6064h) and TPDO2 (606Ch, 60F4h)."""
         if kind == TPDO_BASES[0] and len(data) == 6:
             self.statusword = int.from_bytes(data[:2], "little")
@@ -94,6 +94,9 @@ class DriveClient(NodeClient):
         elif kind == TPDO_BASES[1] and len(data) == 8:
             self.velocity = int.from_bytes(data[:4], "little", signed=True)
             self.following_error = int.from_bytes(data[4:], "little", signed=True)
+        else:
+            return False
+        return True
 
     def rpdo(self) -> Frame:
         """Returns the frame with controlword and target."""

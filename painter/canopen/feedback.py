@@ -44,6 +44,8 @@ class Statistics:
         missing: TPDOs that did not come before the next SYNC.
         retries: SDO requests that were sent again.
         foreign: Frames that no node of the bus file sends.
+        malformed: Frames of its nodes that fit no service: of a wrong length, or
+            answers that nobody asked for.
         load: Worst-case share of the bus that the frames of the last second take.
     """
 
@@ -52,6 +54,7 @@ class Statistics:
     missing: int = 0
     retries: int = 0
     foreign: int = 0
+    malformed: int = 0
     load: float = 0.0
 
 

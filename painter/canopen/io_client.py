@@ -39,13 +39,15 @@ class IoClient(NodeClient):
         """Whether the e-stop chain is closed; False before it is known."""
         return bool((self.inputs or 0) >> self._config.estop_bit & 1)
 
-    def take_process_data(self, kind: int, data: bytes) -> None:
+    def take_process_data(self, kind: int, data: bytes) -> bool:
         """Takes TPDO1 (6000h:1, 6401h:1)."""
-        if kind == TPDO_BASES[0] and len(data) == 3:
-            self.inputs = data[0]
-            counts = int.from_bytes(data[1:3], "little", signed=True)
-            self.pressure = counts * self._config.pressure_scale
-            self.got_tpdo = True
+        if kind != TPDO_BASES[0] or len(data) != 3:
+            return False
+        self.inputs = data[0]
+        counts = int.from_bytes(data[1:3], "little", signed=True)
+        self.pressure = counts * self._config.pressure_scale
+        self.got_tpdo = True
+        return True
 
     def rpdo(self) -> Frame:
         """Returns the frame with valve and flow."""

@@ -92,22 +92,28 @@ class NodeClient:
         self.alarm: str | None = None
         self._booted = False
 
-    def take(self, frame: Frame, now: float) -> None:
-        """Takes a frame; those of other nodes are ignored."""
+    def take(self, frame: Frame, now: float) -> bool:
+        """Takes a frame; returns False for one that fits no service of the node."""
         self.now = now
         data = frame.data
         kind = frame.cob_id - self.node_id
         if kind == SDO_TO_CLIENT:
-            self.sdo.take(data, now)
-        elif kind == HEARTBEAT_BASE and len(data) == 1:
+            return self.sdo.take(data, now)
+        if kind == HEARTBEAT_BASE and len(data) == 1:
             self._take_heartbeat(data[0] & 0x7F)
         elif kind == EMCY_BASE and len(data) == 8:
             self._take_emergency(int.from_bytes(data[:2], "little"))
         else:
-            self.take_process_data(kind, data)
+            return self.take_process_data(kind, data)
+        return True
 
-    def take_process_data(self, kind: int, data: bytes) -> None:
-        """Takes a TPDO; `kind` is its COB-ID without the node-ID."""
+    def take_process_data(self, kind: int, data: bytes) -> bool:
+        """Takes a TPDO; `kind` is its COB-ID without the node-ID.
+
+        Returns:
+            Whether it is one of the node's, and whole.
+        """
+        return False
 
     def poll(self, now: float) -> None:
         """Lets time pass."""

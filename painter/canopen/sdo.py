@@ -142,28 +142,33 @@ class SdoClient:
             self._tries = 0
             self._start(now)
 
-    def take(self, data: bytes, now: float) -> None:
-        """Takes an answer; what does not answer the request is dropped."""
+    def take(self, data: bytes, now: float) -> bool:
+        """Takes an answer; returns False for one that answers no request."""
         request = self._current
         if request is None or len(data) != 8:
-            return
+            return False
+        is_answer = self._take_answer(request, data, now)
+        self.poll(now)
+        return is_answer
+
+    def _take_answer(self, request: SdoRequest, data: bytes, now: float) -> bool:
         command = data[0] >> 5
         is_ours = (int.from_bytes(data[1:3], "little"), data[3]) == (
             request.index,
             request.sub,
         )
-        if command == 4:
-            if is_ours:
-                self._fail(request, int.from_bytes(data[4:8], "little"))
-                self._current = None
+        if command == 4 and is_ours:
+            self._fail(request, int.from_bytes(data[4:8], "little"))
+            self._current = None
         elif self._is_segmented:
-            if command == 0 and data[0] >> 4 & 1 == self._toggle:
-                request.result += data[1 : 8 - (data[0] >> 1 & 7)]
-                self._toggle ^= 1
-                if data[0] & 0x01:
-                    self._finish(request)
-                else:
-                    self._ask_segment(now)
+            if command != 0 or data[0] >> 4 & 1 != self._toggle:
+                return False
+            request.result += data[1 : 8 - (data[0] >> 1 & 7)]
+            self._toggle ^= 1
+            if data[0] & 0x01:
+                self._finish(request)
+            else:
+                self._ask_segment(now)
         elif command == 3 and is_ours and request.data is not None:
             self._finish(request)
         elif command == 2 and is_ours and request.data is None:
@@ -174,7 +179,9 @@ class SdoClient:
             else:
                 self._is_segmented, self._toggle = True, 0
                 self._ask_segment(now)
-        self.poll(now)
+        else:
+            return False
+        return True
 
     def _start(self, now: float) -> None:
         request = self._current

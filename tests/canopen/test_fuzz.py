@@ -71,7 +71,11 @@ def run_noise(lab, ids, seed, total):
 @pytest.mark.parametrize("total", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_frames_that_mean_nothing_change_nothing(lab, total):
     before = positions(lab)
-    assert run_noise(lab, HARMLESS, 1, total) >= total
+    count = run_noise(lab, HARMLESS, 1, total)
+    assert count >= total
+    lab.run(0.1)
+    counts = lab.master.feedback().statistics
+    assert counts.foreign + counts.malformed == count
     assert lab.master.phase == Phase.ENABLED, lab.master.reason
     np.testing.assert_allclose(positions(lab), before, atol=1.0)
     lab.sway()
