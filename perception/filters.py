@@ -56,7 +56,7 @@ def statistical_filter(
     index = np.flatnonzero(keep)
     if index.size < 3:
         return keep
-    points = p_WQs.take(index, axis=1)
+    points = p_WQs if index.size == keep.size else p_WQs.take(index, axis=1)
     # Neighbours in space become neighbours in memory: the tree's queries run from
     # cache, at half the time of a shuffled cloud.
     codes = morton_codes(points)
@@ -183,7 +183,8 @@ def _fast_filter(points: FloatArray, count: int, alpha: float) -> BoolArray:
         tree = planted.result()
     figures = np.full(bounds.size, np.nan)
     # The golden ratio's multiples draw any share of the points evenly along the curve.
-    turns = np.arange(bounds.size) * _GOLDEN % 1.0
+    turns = np.arange(bounds.size) * _GOLDEN
+    turns -= np.floor(turns)
     guess = float(np.quantile(bounds, 1.0 - _SPARSE_SHARE))
     while guess > 0.0:
         shares = _shares(bounds, guess)
@@ -251,6 +252,6 @@ def _limit(figures: FloatArray, shares: FloatArray, total: int, alpha: float) ->
     if sampled.any():
         rest = total - np.count_nonzero(~sampled)
         weights[sampled] *= rest / weights[sampled].sum()
-    mean = weights @ figures / total
-    spread = weights @ np.square(figures - mean)
+    mean = (weights * figures).sum() / total
+    spread = (weights * np.square(figures - mean)).sum()
     return float(mean + alpha * np.sqrt(spread / (total - 1)))
