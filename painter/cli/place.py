@@ -72,7 +72,8 @@ def place(
         raise InputError("--wall and --scene: only one of them can be given.")
     what = f"--wall {wall!r}" if scene is None else f"--scene {scene!r}"
     if scene is None:
-        width, height, zones = *_size(wall or "2x2"), []
+        width, height = _size(wall or "2x2")
+        zones: list[ZoneConfig] = []
     else:
         width, height, zones = _wall_of(load_scene(scene, job.random_seed))
     zones += operator_zones(include, exclude, width, height)

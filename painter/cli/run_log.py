@@ -9,6 +9,7 @@ from painter.cli.common import print_result
 from painter.config import Scenario
 from painter.diagrams.simulation import CycleLog, clearance_violations
 from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
+from painter.planning.zones import points_in_zones
 from painter.run.film_preview import run_preview
 from painter.run.folder import LOOK, RunFolder
 from painter.run.values import Executed, Film, Truth
@@ -130,14 +131,19 @@ def write_truth(
         width=scenario.tile.width,
         height=scenario.tile.height,
     )
+    columns, rows = cell_centres(surface.kind.shape, surface.cell)
+    x0, y0 = float(surface.origin[0]), float(surface.origin[1])
+    p_TQs = X_ST.inverse() @ grid_points(columns + x0, rows + y0)
+    asked = points_in_zones(p_TQs[:2].T, scenario.raster.zones)
     folder.save_film(
         Film.on_tile(
             thickness=film.thickness,
             kind=surface.kind,
-            paintable=is_paintable(surface.kind),
+            # What the operator leaves out is to stay clean.
+            paintable=is_paintable(surface.kind) & asked.reshape(surface.kind.shape),
             cell=surface.cell,
-            x0=float(surface.origin[0]),
-            y0=float(surface.origin[1]),
+            x0=x0,
+            y0=y0,
             X_ST=X_ST,
             tile_size=(scenario.tile.width, scenario.tile.height),
             sprayed=film.sprayed,

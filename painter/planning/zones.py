@@ -23,14 +23,19 @@ def in_zones(mask: BoolArray, cell: float, zones: Sequence[ZoneConfig]) -> BoolA
     Returns:
         (ny, nx) bool.
     """
-    shape = (mask.shape[0], mask.shape[1])
-    marked = np.array(mask)
-    included = [z.corners for z in zones if z.kind == "include"]
+    p_TQs = grid_points(*cell_centres((mask.shape[0], mask.shape[1]), cell))
+    return mask & points_in_zones(p_TQs[:2].T, zones).reshape(mask.shape)
+
+
+def points_in_zones(points_T: FloatArray, zones: Sequence[ZoneConfig]) -> BoolArray:
+    """Tells which points (k, 2), m, in T, zones leave to be painted; see `in_zones`."""
+    marked = np.ones(len(points_T), dtype=bool)
+    included = [zone.corners for zone in zones if zone.kind == "include"]
     if included:
-        marked &= np.any([marked_cells(c, shape, cell) for c in included], axis=0)
+        marked &= np.any([inside(corners, points_T) for corners in included], axis=0)
     for zone in zones:
         if zone.kind == "exclude":
-            marked &= ~marked_cells(zone.corners, shape, cell)
+            marked &= ~inside(zone.corners, points_T)
     return marked
 
 

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from painter.planning.config import TipConfig
+from painter.planning.config import TipConfig, ZoneConfig
 from painter.planning.preview import FilmPreview, preview_film
 from painter.planning.spray_path import PaintProgram
 from painter.planning.tile import grid_points
+from painter.planning.zones import in_zones
 from painter.run import style
 from painter.run.film_on_tile import film_around
 from painter.run.folder import RunFolder
@@ -26,7 +27,7 @@ def run_preview(
     Args:
         folder: The run.
         program: Its program.
-        scenario: Its scenario, for the tip.
+        scenario: Its scenario, for the tip and the operator's zones.
 
     Returns:
         The prediction, or None if the run has no segmentation.
@@ -37,9 +38,11 @@ def run_preview(
     film, before = folder.film(), None
     if film is not None and film.before is not None:
         before = film_around(folder, segmentation, film.before)
+    zones = [ZoneConfig(**zone) for zone in scenario["raster"]["zones"]]
+    asked = in_zones(np.asarray(segmentation.wall_mask), segmentation.cell, zones)
     return preview_film(
         program.strokes,
-        segmentation,
+        segmentation.replace(wall_mask=asked),
         tip=TipConfig(**scenario["gun"]["tip"]),
         nominal=program.nominal_thickness,
         before=before,

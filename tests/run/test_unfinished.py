@@ -50,6 +50,17 @@ def test_film_is_seen_where_it_lies(full_folder, film, segmentation):
     assert np.argwhere(dut > 0.5).tolist() == [[border + 30, border + 50]]
 
 
+def test_what_the_operator_left_out_does_not_count_as_bare(full_folder, program):
+    scenario = full_folder.scenario()
+    kept = [s for s in program.strokes if s.start_T[0] < 1.0]
+    half = program.replace(strokes=tuple(kept))
+    bare = run_preview(full_folder, half, scenario).coverage
+    scenario["raster"]["zones"] = [{"kind": "include", "corners": [[0, 0], [1, 2]]}]
+    asked = run_preview(full_folder, half, scenario).coverage
+    assert bare < 0.6
+    assert asked > 0.9
+
+
 def test_preview_of_a_run_gone_on_with_counts_what_was_there(
     full_folder, program, film
 ):
