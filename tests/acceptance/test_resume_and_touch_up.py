@@ -10,7 +10,8 @@ from painter.cli.main import run
 from painter.run.arrays import load_film
 from painter.run.folder import FILM, REPORT
 
-pytestmark = pytest.mark.slow
+# Five cycles of a minute or two each, on a machine that may have other work.
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 SCENE = "terrace"  # Its door and window leave no scene more edges to mend along.
 # x0, y0, x1, y1 in T, m: 20 x 20 cm of wall between door and window.
@@ -28,15 +29,25 @@ def undisturbed(tmp_path_factory):
     return out, simulate(out, SCENE)
 
 
-def test_a_job_stopped_anywhere_and_resumed_covers_as_much(undisturbed, tmp_path):
+@pytest.mark.parametrize("result", ["ABORTED", "FAULT"])
+def test_a_job_stopped_anywhere_and_resumed_covers_as_much(
+    result, undisturbed, tmp_path
+):
     _, whole = undisturbed
-    count = whole["stroke_count"]
-    at = round(float(np.random.default_rng(5).uniform(2.0, count)), 2)
-    words = [SCENE, "--stop-at-stroke", str(at)]
-    stopped = simulate(tmp_path / "stopped", *words, status=1)
-    assert stopped["result"] == "ABORTED"
+    rng = np.random.default_rng(5)
+    if result == "ABORTED":
+        at = rng.uniform(2.0, whole["stroke_count"])
+        words = ["--stop-at-stroke", f"{at:.2f}"]
+    else:
+        phases = whole["phase_time_s"]
+        before = sum(time for phase, time in phases.items() if phase != "RETRACT")
+        at = before - rng.uniform(0.1, 0.9) * phases["PAINT"]
+        words = ["--set", f"arm.faults=[{{time: {at:.2f}, joint: 2}}]"]
+    stopped = simulate(tmp_path / "stopped", SCENE, *words, status=1)
+    assert stopped["result"] == result
     assert stopped["coverage"] < whole["coverage"] - 0.01
-    rest = simulate(tmp_path / "rest", "--resume", str(tmp_path / "stopped"))
+    words = ["--resume", str(tmp_path / "stopped"), "--set", "arm.faults=[]"]
+    rest = simulate(tmp_path / "rest", *words)
     assert rest["result"] == "DONE"
     assert rest["collisions"] == 0
     assert rest["coverage"] == pytest.approx(whole["coverage"], abs=0.01)
