@@ -17,12 +17,12 @@ LONG_BENCHES := $(patsubst %,benchmarks/bench_%.py,\
   edges fine_steps map map_recordings masks masks_pcl)
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: help setup browser demo test test-all lint format bench bench-all \
+.PHONY: help setup browser demo test test-all test-socketcan lint format bench bench-all \
   notebooks clean
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /:/' \
-	  | awk -F: '{printf "make %-10s %s\n", $$1, $$2}'
+	  | awk -F: '{printf "make %-14s %s\n", $$1, $$2}'
 
 setup: $(STAMP) ## Install system libraries (where allowed) and packages into .venv
 	@:
@@ -87,6 +87,11 @@ test: setup ## Run the fast tests
 
 test-all: setup ## Run all tests but those that need hardware
 	@$(BIN)/python -m pytest -m 'not hardware' $(PYTEST_ARGS)
+
+test-socketcan: setup ## Run the drive tests on a real SocketCAN interface
+	@$(install_packages)
+	install_packages user-mode-linux kmod iproute2 can-utils || true
+	tests/socketcan/run $(BIN)/python
 
 lint: setup ## Check format, style, types and that notebooks are stripped
 	@$(BIN)/ruff format --check .
