@@ -85,6 +85,7 @@ PYDRAKE = {
 HARDWARE_PACKAGES = {"can", "canopen", "pyrealsense2"}
 HARDWARE_MODULES = {
     "painter.camera.realsense",
+    "painter.camera.software",
     "painter.canopen",
     "painter.systems.canopen_arm",
     "painter.systems.canopen_gun",

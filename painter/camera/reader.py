@@ -89,10 +89,10 @@ def camera_opener(
             "the camera needs pyrealsense2; install it with: "
             "pip install 'painter[hardware]'."
         )
-    from painter.camera import realsense
+    from painter.camera import realsense, software
 
     if source is not None:
-        return lambda: realsense.SoftwareCamera(
+        return lambda: software.SoftwareCamera(
             source, config, wanted, baseline=baseline
         )
     if config.recording:

@@ -1,14 +1,12 @@
-"""librealsense: a device, a recording, or its software device fed with pictures.
+"""librealsense: a device on USB, or a recording.
 
-All three are a librealsense device whose sensors are opened, set and filtered by the
-same code, so that tests without a camera run what the robot runs.
+Both, and the software device, are a librealsense device whose sensors are opened, set
+and filtered by the same code, so that tests without a camera run what the robot runs.
 """
 
 import logging
-import math
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,13 +15,12 @@ import numpy as np
 import pyrealsense2 as rs
 
 from painter.camera.config import CameraDriverConfig
-from painter.camera.frames import CameraError, CameraFrame, ColorArray, FrameSource
+from painter.camera.frames import CameraError, CameraFrame, ColorArray
 from perception.depth import CameraIntrinsics
 from perception.pinhole import PinholeMap
 
 _LOGGER = logging.getLogger(__name__)
 _QUEUE = 4
-_DEPTH_UNIT = 0.001
 _TRY_TIME = 25.0  # s
 
 
@@ -176,95 +173,6 @@ class RealSense:
             return None
 
 
-class SoftwareCamera:
-    """librealsense's software device, fed from a source; a `Camera`."""
-
-    def __init__(
-        self,
-        source: FrameSource,
-        config: CameraDriverConfig,
-        wanted: CameraIntrinsics,
-        *,
-        baseline: float,
-    ) -> None:
-        """Makes the device and opens it as one on USB would be.
-
-        Args:
-            source: Where pictures come from.
-            config: Preset, exposure, filters.
-            wanted: Camera that the source's pictures are of.
-            baseline: Of the stereo imagers, m; the filters work in disparity.
-
-        Raises:
-            CameraError: The device refuses a setting.
-        """
-        self._source = source
-        self._shape = (wanted.height, wanted.width)
-        self._number = 0
-        self._device = rs.software_device()
-        self._depth = self._device.add_sensor("Stereo Module")
-        self._depth_profile = self._depth.add_video_stream(
-            _stream(rs.stream.depth, rs.format.z16, 2, wanted, config.fps), True
-        )
-        self._depth.add_read_only_option(rs.option.depth_units, _DEPTH_UNIT)
-        self._depth.add_read_only_option(rs.option.stereo_baseline, 1e3 * baseline)
-        for option, most in (
-            (rs.option.visual_preset, 6),
-            (rs.option.exposure, 200_000),
-            (rs.option.enable_auto_exposure, 1),
-            (rs.option.emitter_enabled, 2),
-        ):
-            limits = rs.option_range()
-            limits.min, limits.max, limits.step, limits.default = 0, most, 1, 0
-            self._depth.add_option(option, limits, True)
-        self._rgb = self._device.add_sensor("RGB Camera")
-        self._rgb_profile = self._rgb.add_video_stream(
-            _stream(rs.stream.color, rs.format.rgb8, 3, wanted, config.fps), True
-        )
-        self._has_color = config.color
-        self._camera = RealSense(self._device, config, wanted, name="software device")
-
-    def wait(self, timeout: float) -> CameraFrame | None:
-        """Feeds the device with the source's next picture and returns what it makes.
-
-        Raises:
-            CameraError: The source is gone, or its picture is not of the camera's size.
-        """
-        start = time.monotonic()
-        found = self._source.wait_frame(timeout)
-        if found is None:
-            return None
-        depth, color, when = found
-        self._number += 1
-        if color is not None and self._has_color:
-            self._push(self._rgb, self._rgb_profile, color, when)
-        self._push(self._depth, self._depth_profile, depth, when)
-        return self._camera.wait(max(0.1, timeout - (time.monotonic() - start)))
-
-    def close(self) -> None:
-        """Stops the device."""
-        self._camera.close()
-
-    def _push(
-        self, sensor: Any, profile: Any, pixels: np.ndarray[Any, Any], when: float
-    ) -> None:
-        if pixels.shape[:2] != self._shape:
-            raise CameraError(
-                f"camera source: a picture of {pixels.shape[:2]}, not {self._shape}."
-            )
-        frame = rs.software_video_frame()
-        frame.pixels = np.ascontiguousarray(pixels)
-        frame.bpp = pixels.itemsize * math.prod(pixels.shape[2:])
-        frame.stride = frame.bpp * pixels.shape[1]
-        frame.timestamp = 1e3 * when
-        frame.domain = rs.timestamp_domain.hardware_clock
-        frame.frame_number = self._number
-        frame.profile = profile.as_video_stream_profile()
-        if pixels.ndim == 2:
-            frame.depth_units = _DEPTH_UNIT
-        sensor.on_video_frame(frame)
-
-
 def make_filters(config: CameraDriverConfig) -> list[Any]:
     """Returns librealsense's filters in the order they run."""
     filters = [rs.threshold_filter(config.threshold_min, config.threshold_max)]
@@ -351,19 +259,6 @@ def _try_recording(path: str) -> None:
         words = done.stderr.decode(errors="replace").split()
         reason = " ".join(words) or f"it ended with {done.returncode}"
         raise CameraError(f"camera: {path}: librealsense cannot open it: {reason}.")
-
-
-def _stream(kind: Any, form: Any, size: int, camera: CameraIntrinsics, fps: int) -> Any:
-    stream = rs.video_stream()
-    stream.type, stream.fmt, stream.bpp = kind, form, size
-    stream.uid, stream.index, stream.fps = int(kind), 0, fps
-    stream.width, stream.height = camera.width, camera.height
-    lens = rs.intrinsics()
-    lens.width, lens.height = camera.width, camera.height
-    lens.fx, lens.fy, lens.ppx, lens.ppy = camera.fx, camera.fy, camera.cx, camera.cy
-    lens.model, lens.coeffs = rs.distortion.none, [0.0] * 5
-    stream.intrinsics = lens
-    return stream
 
 
 def _intrinsics(name: str, profile: Any) -> CameraIntrinsics:

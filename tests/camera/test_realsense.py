@@ -12,11 +12,11 @@ from painter.camera.config import CameraDriverConfig  # noqa: E402
 from painter.camera.frames import CameraError  # noqa: E402
 from painter.camera.realsense import (  # noqa: E402
     RealSense,
-    SoftwareCamera,
     apply_options,
     open_device,
     open_recording,
 )
+from painter.camera.software import SoftwareCamera  # noqa: E402
 from perception.config import StereoConfig  # noqa: E402
 from perception.depth import CameraIntrinsics  # noqa: E402
 
