@@ -82,11 +82,14 @@ def _cells(low: float, high: float, cell: float) -> Any:
     return np.arange(round(low / cell), round(high / cell))
 
 
-def precision_recall(result: WallSegmentation, case: Case) -> tuple[float, float]:
-    """Compares points with labels by people: "wall" is what has a cell of the mask.
+def precision_recall(
+    result: WallSegmentation, case: Case, limit: float
+) -> tuple[float, float]:
+    """Compares points with labels by people; all finite points count.
 
-    What is over 5 cm behind another point of its cell is hidden from the gun, which is
-    square to the wall where the sensor looked at a slant, and is left out.
+    What the gun meets in a cell is "wall" if the cell is in the mask. Of a point behind
+    that, which only a sensor that looks at a slant sees, the mask says nothing: it is
+    wall if it lies within `limit`, m, of the wall's plane.
     """
     points = read_cloud(DATA / case.name).p_WQs
     labels = read_fields(DATA / case.name)["label"].ravel()
@@ -97,13 +100,14 @@ def precision_recall(result: WallSegmentation, case: Case) -> tuple[float, float
     finite = np.isfinite(points).all(axis=0)
     inside = finite & (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
     cells = (rows[inside], columns[inside])
+    z = p_TQs[2, inside]
     front = np.full((ny, nx), -np.inf)
-    np.maximum.at(front, cells, p_TQs[2, inside])
-    counted, said = finite.copy(), np.zeros(labels.size, dtype=bool)
-    counted[inside] = p_TQs[2, inside] >= front[cells] - HIDDEN
-    said[inside] = result.wall_mask[cells]
-    truth = np.isin(labels, case.labels) & counted
-    said &= counted
+    np.maximum.at(front, cells, z)
+    hidden = z < front[cells] - HIDDEN
+    level = np.abs(z) <= limit
+    said = np.zeros(labels.size, dtype=bool)
+    said[inside] = np.where(hidden, level, result.wall_mask[cells])
+    truth = np.isin(labels, case.labels) & finite
     hits = np.count_nonzero(said & truth)
     return hits / np.count_nonzero(said), hits / np.count_nonzero(truth)
 
@@ -137,7 +141,7 @@ def judge(case: Case, folder: Path) -> tuple[list[str], list[str]]:
         if part < case.least_filled:
             wrong.append(f"under {case.least_filled:.0%} wall")
     if case.labels:
-        pair = precision_recall(result, case)
+        pair = precision_recall(result, case, figures["inlier_distance_m"])
         found.append("precision {:.3f}, recall {:.3f}".format(*pair))
         if any(value < least for value, least in zip(pair, case.least, strict=True)):
             wrong.append("under {:g} / {:g}".format(*case.least))

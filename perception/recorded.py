@@ -19,6 +19,7 @@ from perception.recorded_tile import (
     set_back_wall,
     side_of_view,
 )
+from perception.refine import refine_segmentation
 from perception.segmentation import (
     FoundPlanes,
     SegmentationSteps,
@@ -71,6 +72,7 @@ def segment_recorded(
     fit_cell: bool = False,
     fit_inlier_distance: bool = False,
     set_back: float = 0.0,
+    fine: bool = False,
 ) -> RecordedWall:
     """Finds the wall of a recorded cloud and segments a tile in the middle of it.
 
@@ -95,6 +97,8 @@ def segment_recorded(
             `config.distance_threshold` where there is little noise.
         set_back: How far behind the wall's plane parts of the wall may lie that it
             does not enclose (dormers), m; 0 = none.
+        fine: Whether the mask is drawn by fine steps against the wall's own surface, as
+            on the robot; see `refine_segmentation`. It suits dense depth images.
 
     Returns:
         The wall; its segmentation's cell is the one used.
@@ -139,11 +143,18 @@ def segment_recorded(
     wall = wall_on_plane(plane, X_WT, **tile, total=found.kept_count)
     config = dataclasses.replace(config, cell=cell, distance_threshold=limit)
     steps = segment_tile(found, wall, number + 1, **tile, config=config)
-    steps = clear_feet(steps, limit=limit)
+    if fine:
+        p_TQs = wall.X_WT.inverse() @ found.p_WQs[:, found.kept]
+        result = refine_segmentation(
+            steps.segmentation, p_TQs, config=config, seed=seed
+        )
+        steps = steps.replace(segmentation=result)
+    else:
+        steps = clear_feet(steps, limit=limit)
     area = 0.0
     if set_back > 0.0:
         steps, area = set_back_wall(steps, set_back=set_back)
-    if cell > least_cell:
+    if cell > least_cell and not fine:
         steps = close_gaps(steps)
     return RecordedWall(
         steps=steps,

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from perception.planes import Plane
 from perception.segmentation import SegmentationSteps
+from perception.unseen import Reason
 from perception.values import BoolArray, FloatArray, FrozenValue
 
 # A sensor sees a wall from no farther than so many times the cloud's extent; beyond,
@@ -214,7 +215,12 @@ def set_back_wall(
             if -set_back <= depth < 0.0 and between[region].mean() < _MOST_ENCLOSED:
                 mask |= region
     area = float(np.count_nonzero(mask & ~wall)) * result.cell**2
-    return steps.replace(segmentation=result.replace(wall_mask=mask)), area
+    reason = result.reason
+    if reason is not None:
+        reason = np.where(mask, Reason.WALL, reason).astype(np.uint8)
+    return steps.replace(
+        segmentation=result.replace(wall_mask=mask, reason=reason)
+    ), area
 
 
 def _between(wall: BoolArray, *, axis: int) -> BoolArray:

@@ -20,6 +20,9 @@ plate of 0.2 m is bridged and not climbed; closer knots are for walls that need 
 _SCATTER, _FOLLOWED = 0.0015, 2.5
 """A wall is followed if it scatters less than this about its surface, m, or than so
 many times its noise."""
+_FINEST = 0.2
+"""Blocks larger than this share of the closer knots' distance cannot place a step; the
+spline would climb what stands on the wall."""
 _PENALTIES = (1e6, 1e3, 1.0, 1e-2)
 """Weight of the penalty against that of a cell: from a quadratic to the spline."""
 _MOST_REPEATS = 30
@@ -103,7 +106,8 @@ def fit_piece(blocks: Blocks, cells: BoolArray) -> Piece:
         # 1.645: nine tenths of a normal variable are closer to its mean.
         off = np.abs(blocks.depth - piece.height)[cells]
         scatter = float(np.quantile(off, 0.9)) / 1.645
-        if scatter <= max(_SCATTER, _FOLLOWED * blocks.noise):
+        even = scatter <= max(_SCATTER, _FOLLOWED * blocks.noise)
+        if even or blocks.cell > _FINEST * _KNOTS[-1]:
             break
     return piece
 

@@ -95,6 +95,15 @@ def segment(
             "it, such as dormers, m."
         ),
     ] = 0.0,
+    fine: Annotated[
+        bool,
+        typer.Option(
+            "--fine",
+            help="Draw the mask by fine steps against the wall's own surface, as the "
+            "robot does; for dense depth images. Adds surface, normals, confidence, "
+            "reasons and outlines of openings.",
+        ),
+    ] = False,
     distance: Annotated[
         float | None,
         typer.Option(
@@ -154,6 +163,7 @@ def segment(
         fit_cell=not _is_set(words, "cell"),
         fit_inlier_distance=not _is_set(words, "distance_threshold"),
         set_back=set_back,
+        fine=fine,
     )
     with output_folder(out) as folder:
         figures = write_recorded_wall(folder, wall, title=cloud.name)
@@ -161,7 +171,9 @@ def segment(
         print_result(figures, as_json=True)
         return
     short = {
-        name: value for name, value in figures.items() if not isinstance(value, list)
+        name: value
+        for name, value in figures.items()
+        if not isinstance(value, list | dict)
     }
     print_result(short, as_json=False)
     Console().print(_table(figures["regions"]))

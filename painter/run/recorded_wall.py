@@ -10,6 +10,8 @@ from painter.run.segmentation_picture import segmentation_picture
 from perception.recorded import RecordedWall
 from perception.segmentation import SegmentationSteps
 from perception.store import save_segmentation, save_wall_mask
+from perception.unseen import Reason
+from perception.values import Opening, WallSegmentation
 from perception.wall_choice import contrast
 
 
@@ -44,7 +46,8 @@ def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
     Returns:
         Counts of points; the wall's distance from the origin of the cloud's frame,
         normal (to the side it was seen from) and rms; cell and inlier distance used;
-        areas; and lists of planes and of regions.
+        areas, of what is not to be painted by reason; and lists of openings, with
+        their boxes in T (left, bottom, right, top), of planes and of regions.
     """
     steps = wall.steps
     result, found = steps.segmentation, steps.found
@@ -69,6 +72,8 @@ def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
         "wall_area_m2": _rounded(np.count_nonzero(result.wall_mask) * area),
         "other_area_m2": _rounded(np.count_nonzero(seen & ~result.wall_mask) * area),
         "unseen_area_m2": _rounded(np.count_nonzero(~seen) * area),
+        "not_painted_m2": _reasons(result),
+        "openings": [_opening_figures(opening) for opening in result.openings],
         "planes": [
             {
                 "normal": [_rounded(value) for value in plane.normal],
@@ -96,6 +101,30 @@ def _region_figures(steps: SegmentationSteps, label: int) -> dict[str, Any]:
         "area_m2": _rounded(np.count_nonzero(cells) * result.cell**2),
         "median_depth_m": _rounded(np.median(depth)) if depth.size else None,
         "wall": bool(result.wall_mask[cells].any()),
+    }
+
+
+def _reasons(result: WallSegmentation) -> dict[str, float]:
+    """Returns the area of what is not to be painted by reason, m²."""
+    if result.reason is None:
+        return {}
+    areas = np.bincount(result.reason[~result.wall_mask], minlength=len(Reason))
+    return {
+        reason.name.lower(): _rounded(areas[reason] * result.cell**2)
+        for reason in Reason
+        if reason is not Reason.WALL and areas[reason]
+    }
+
+
+def _opening_figures(opening: Opening) -> dict[str, Any]:
+    left, bottom = opening.p_TVs.min(axis=1)
+    right, top = opening.p_TVs.max(axis=1)
+    return {
+        "kind": opening.kind,
+        "area_m2": _rounded(opening.area),
+        "box_m": [_rounded(edge) for edge in (left, bottom, right, top)],
+        "depth_m": _finite(opening.depth),
+        "glass_share": _rounded(opening.glass_share),
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, TwoSlopeNorm
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Polygon
 
 from painter.run import style
 from perception.segmentation import SegmentationSteps
@@ -136,32 +136,38 @@ def draw_depth(ax: Axes, result: WallSegmentation) -> None:
 
 
 def draw_residuals(ax: Axes, result: WallSegmentation) -> None:
-    """Draws how far the wall's cells are from its plane.
+    """Draws how far the wall's cells are from its surface, or else from its plane.
 
     Args:
         ax: Where to draw.
         result: The segmentation.
     """
     ax.set_facecolor(_UNSEEN)
-    residuals = np.where(result.wall_mask, 1000.0 * result.depth, np.nan)
+    surface = 0.0 if result.surface is None else result.surface
+    residuals = np.where(result.wall_mask, 1000.0 * (result.depth - surface), np.nan)
     measured = residuals[np.isfinite(residuals)]
     away = np.abs(measured - np.median(measured)) if measured.size else np.zeros(1)
     limit = max(1.0, float(np.percentile(away, 95.0)))
     image = ax.imshow(
         residuals, cmap="RdBu", vmin=-limit, vmax=limit, **_placement(result)
     )
-    _add_bar(ax, image, "mm before the wall's plane")
+    what = "plane" if result.surface is None else "surface"
+    _add_bar(ax, image, f"mm before the wall's {what}")
     _finish(ax, result, f"Residuals of the wall (95 % within {limit:.0f} mm)")
 
 
 def draw_mask(ax: Axes, result: WallSegmentation) -> None:
-    """Draws the mask: white = paint.
+    """Draws the mask: white = paint, with the outlines of windows and doors.
 
     Args:
         ax: Where to draw.
         result: The segmentation.
     """
     ax.imshow(result.wall_mask, cmap="gray", vmin=0, vmax=1, **_placement(result))
+    for opening in result.openings:
+        ax.add_patch(
+            Polygon(opening.p_TVs.T, fill=False, edgecolor=style.ORANGE, linewidth=1.5)
+        )
     area = np.count_nonzero(result.wall_mask) * result.cell**2
     _finish(ax, result, f"Mask (white = paint, {area:.2f} m²)")
 

@@ -160,3 +160,30 @@ def test_folder_of_depth_images_is_fused_with_the_camera_beside_it(tmp_path):
     assert figures["wall_distance_m"] == pytest.approx(0.7)
     # 159 x 119 pixels of 0.7 / 80 m.
     assert figures["wall_area_m2"] == pytest.approx(1.39 * 1.04, rel=0.03)
+
+
+def test_fine_steps_find_what_the_planes_cannot_part(tmp_path):
+    # A plate 12 mm high is within the planes' 3 cm, and a window on a bulged wall.
+    window = Patch(0.2, 1.2, 0.7, 1.8, -0.10)
+    plate = Patch(1.2, 0.4, 1.4, 0.6, 0.012)
+    rng = np.random.default_rng(0)
+    patches = [window, plate]
+    points = synthetic_wall(patches, spacing=0.01, margin=0.0, noise=0.0007, rng=rng)
+    points[2] += 0.02 * (points[0] - 1.0) ** 2
+    np.save(tmp_path / "wall.npy", (X_CT @ points).T)
+    words = ["segment", str(tmp_path / "wall.npy"), "--cell", "0.02", "--tile", "2x2"]
+    words += ["--inlier-distance", "0.03"]
+    assert run([*words, "--out", str(tmp_path / "plain")]) == 0
+    assert run([*words, "--out", str(tmp_path / "fine"), "--fine"]) == 0
+    plain = load_segmentation(tmp_path / "plain" / "segmentation.npz")
+    fine = load_segmentation(tmp_path / "fine" / "segmentation.npz")
+    on_plate = (slice(22, 28), slice(62, 68))
+    assert plain.wall_mask[on_plate].all()
+    assert not fine.wall_mask[on_plate].any()
+    (opening,) = fine.openings
+    np.testing.assert_allclose(
+        opening.p_TVs, [[0.2, 0.7, 0.7, 0.2], [1.2, 1.2, 1.8, 1.8]], atol=0.025
+    )
+    figures = json.loads((tmp_path / "fine" / "segmentation.json").read_text())
+    assert figures["not_painted_m2"]["raised"] == pytest.approx(0.04, abs=0.008)
+    assert figures["openings"][0]["depth_m"] == pytest.approx(-0.10, abs=0.005)
