@@ -144,11 +144,11 @@ class StopRamp:
             now: When it begins, s.
             q: (5,) where the arm is commanded to be, rad.
             v: (5,) how fast, rad/s.
-            limits: Of each joint; `a_max` gives the duration.
+            limits: Of each joint; `stop` gives the duration.
         """
         self._start, self._q, self._v = now, q.copy(), v.copy()
-        a_max = np.array([limit.a_max for limit in limits])
-        self.duration = float(np.max(np.abs(v) / a_max, initial=0.0))
+        stop = np.array([limit.stop for limit in limits])
+        self.duration = float(np.max(np.abs(v) / stop, initial=0.0))
         self._low = np.array([limit.q_min for limit in limits])
         self._high = np.array([limit.q_max for limit in limits])
 

@@ -118,7 +118,7 @@ class JointLimits:
         q_max: Highest position, rad.
         v_max: Greatest speed, rad/s.
         a_max: Greatest acceleration of planned motions, rad/s².
-        stop: Deceleration of a quick stop, rad/s².
+        stop: Deceleration of any stop, rad/s².
         following_error: Difference of commanded and actual position that is a fault,
             rad.
     """

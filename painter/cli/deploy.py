@@ -5,7 +5,7 @@ import importlib.metadata
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -170,6 +170,7 @@ def deploy(
             )
             # What was found out at the end, such as the stroke to go on with.
             tell(left.end_time, left.status, FollowerStatus())
+            _log_health(folder, left.end_time, process, reader)
         except PainterError as error:
             folder.mark_incomplete(f"{Phase.FAULT.value}: {error}")
             raise
@@ -257,6 +258,21 @@ def _check(
         folder.log(0.0, "check", check=check.name, **result)
         if not check.passed:
             raise BusError(f"pre-flight check {check.name}: {check.text}.")
+
+
+def _log_health(
+    folder: RunFolder, time: float, process: BusProcess, reader: CameraReader
+) -> None:
+    """Logs how bus and camera fared."""
+    health = reader.read().health
+    folder.log(time, "camera", **dataclasses.asdict(health))
+    with suppress(BusError):
+        report = process.report()
+        if report is not None:
+            late = report.lateness
+            data = dataclasses.asdict(report.feedback.statistics)
+            data |= {} if late is None else {"late": dataclasses.asdict(late)}
+            folder.log(time, "bus", is_fifo=report.is_fifo, **data)
 
 
 def _ask(question: str) -> bool:

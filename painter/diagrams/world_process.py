@@ -6,6 +6,7 @@ shared memory, and here camera, film and clearances follow as fast as they can.
 
 import contextlib
 import multiprocessing
+import os
 import signal
 import tempfile
 import time
@@ -29,6 +30,7 @@ _COLOR_EVERY = 5
 # While the gun sprays, the lens is covered: black pictures at this period, s.
 _BLACK_PERIOD = 0.25
 _PATIENCE = 120.0
+_NICENESS = -15
 NQ = 5
 
 
@@ -146,7 +148,7 @@ class _Follower:
             if stamp > 0.0:
                 self._server.send(picture.depth_mm, color, stamp)
             self._shape = picture.depth_mm.shape
-        elif now >= self._black_at:
+        elif self._pictures and now >= self._black_at:
             self._black_at = now + _BLACK_PERIOD
             self._server.send(np.zeros(self._shape, np.uint16), None, when)
 
@@ -168,6 +170,8 @@ def _read(text: str) -> Scenario:
 def _run(scenario: str, ring_name: str, camera: str, pipe: Connection) -> None:
     """The world's process: Ctrl-C is the parent's business."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(OSError):  # A camera waits for no other program.
+        os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
     ring = SampleRing(name=ring_name)
     server = None
     try:

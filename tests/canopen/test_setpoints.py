@@ -75,11 +75,11 @@ def test_unusable_setpoints_are_refused(points, message):
 def test_all_joints_stop_at_the_same_time():
     v = np.array([1.0, -2.0, 0.5, 0.0, 1.0])
     dut = StopRamp(10.0, np.zeros(5), v, LIMITS)
-    assert dut.duration == pytest.approx(2.0 / 4.0)
+    assert dut.duration == pytest.approx(2.0 / 8.0)
     np.testing.assert_allclose(dut.sample(10.0).v, v)
-    np.testing.assert_allclose(dut.sample(10.25).v, v / 2)
+    np.testing.assert_allclose(dut.sample(10.125).v, v / 2)
     # Even deceleration: v T / 2.
-    np.testing.assert_allclose(dut.sample(99.0).q, v * 0.25)
+    np.testing.assert_allclose(dut.sample(99.0).q, v * 0.125)
     np.testing.assert_allclose(dut.sample(99.0).v, 0.0)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from painter.canopen.bus_config import BusConfig
-from painter.canopen.frames import Frame
+from painter.canopen.frames import SYNC_ID, Frame
 from painter.canopen.links import Link, LinkError, open_link, pack_frame, unpack_frame
 from painter.canopen.realtime import settle_memory
 from painter.canopen.sim.load import Load
@@ -121,6 +121,7 @@ class RackServer:
         self._send = self.rack.wire.attach(self._to_link)
         self._start = time.monotonic()
         self.slips = 0
+        self._synced = 0.0
 
     def run(self, is_done: Callable[[float], bool]) -> None:
         """Runs until `is_done`, which is asked about every ms with the rack's time."""
@@ -158,10 +159,24 @@ class RackServer:
             with contextlib.suppress(LinkError):
                 self._link.reopen()
         now = max(self._now(), self.rack.now)
+        has_sync = any(frame.cob_id == SYNC_ID for frame in frames)
+        when = self.rack.now if has_sync else now
         for frame in frames:
+            if frame.cob_id == SYNC_ID:
+                when = self._sync_time(now)
+                self.rack.advance(when)
             if not frame.is_error:  # Of this computer's controller; no node sees it.
-                self._send(frame, now)
+                self._send(frame, when)
         self.rack.advance(now)
+
+    def _sync_time(self, now: float) -> float:
+        """Returns when a SYNC came: when it was due, if this process was held up since.
+
+        Else nodes would see none for long, and then several at once.
+        """
+        due = max(self._synced + self.rack.bus.cycle, self.rack.now)
+        self._synced = min(now, due) if now - due < _MOST_BEHIND else now
+        return self._synced
 
     def _to_link(self, frame: Frame, now: float) -> None:
         with contextlib.suppress(LinkError):
