@@ -11,16 +11,21 @@ from scipy.special import erf
 from perception.config import SegmentationConfig
 from perception.errors import NoWallError
 from perception.openings import find_openings
+from perception.outlines import straighten
 from perception.regions import drop_specks, sort_by_area
 from perception.steps import Steps, find_steps, sub_cells
 from perception.unseen import Reason, close_gaps, explain
 from perception.values import BoolArray, FloatArray, IntArray, WallSegmentation
+from perception.votes import point_votes, wall_share
 from perception.wall_surface import fit_wall_surface
 
 Grid = TypeVar("Grid", BoolArray, IntArray, FloatArray)
 
 _SQUARE = np.ones((3, 3), dtype=np.bool_)
-_DENSE = 0.6  # Spacing of points against the cell up to which sub-cells are used.
+_SPLITS = (2, 4)  # Least and most sub-cells along a cell's edge.
+_MAJORITY = 0.58
+"""Share of votes from which a cell is wall: to paint a thing is worse than to leave a
+strip of wall, and its edge is known to a fraction of the spacing of points."""
 _GAP_CONFIDENCE = 0.5  # Of what is only filled in between points.
 
 
@@ -59,9 +64,7 @@ def refine_segmentation(
     cell = coarse.cell
     ny, nx = coarse.labels.shape
     spacing = _spacing(p_TQs, coarse, config)
-    # An edge through a cell is decided by the vote of its sub-cells. In a thin cloud
-    # most of these are empty, and things seen at a slant through a window fill them.
-    split = 2 if spacing <= _DENSE * cell else 1
+    split = min(max(round(cell / spacing), _SPLITS[0]), _SPLITS[1])
     fine = sub_cells(
         p_TQs,
         counts=counts,
@@ -70,6 +73,7 @@ def refine_segmentation(
         height=ny * cell,
         cell=cell,
         split=split,
+        spacing=spacing,
     )
     near = np.abs(fine.depth) <= config.distance_threshold + config.cluster_tolerance
     near |= np.repeat(np.repeat(coarse.wall_mask, split, axis=0), split, axis=1)
@@ -80,19 +84,20 @@ def refine_segmentation(
     except ValueError as error:
         raise NoWallError(f"the wall has no surface on the tile: {error}") from error
     steps = find_steps(fine, surface, cell=cell / split, config=config)
-    seen, share, residual = _vote(steps, split)
+    votes = point_votes(fine, steps, surface)
+    share = wall_share(votes, (ny, nx), cell=cell, spacing=spacing)
+    seen = np.asarray(np.isfinite(_blocks(steps.residual, split)).any(axis=2))
     gap = close_gaps(seen, spacing=spacing, cell=cell)
     hole = ~seen & ~gap
-    level = _fill(seen & (share > 0.5), seen, gap)
+    level = _fill(seen & (share > _MAJORITY), seen, gap)
+    level = straighten(level | hole, votes, cell=cell) & ~hole
+    residual = _fill(_mean_residual(steps, level, split), seen, gap)
     off = drop_specks(~level, min_area=config.min_object_area, cell=cell)
     mask = drop_specks(~off & ~hole, min_area=config.min_region_area, cell=cell)
     side = np.where(residual >= 0.0, Reason.RAISED, Reason.RECESSED)
-    reason = np.where(off, _fill(side, seen, gap), Reason.SPECK)
+    reason = np.where(off, side, Reason.SPECK)
     reason = explain(reason, residual, hole, cell=cell, p_TCs=p_TCs)
     openings = find_openings(reason, residual, cell=cell)
-    for opening in openings:
-        # The outline decides where the sub-cells disagree, no farther.
-        mask &= ~(opening.inner & (share < 1.0))
     reason[mask] = Reason.WALL
     if not mask.any():
         raise NoWallError(
@@ -119,21 +124,16 @@ def _blocks(grid: Grid, split: int) -> Grid:
     return blocks.reshape(ny, nx, split**2)
 
 
-def _vote(steps: Steps, split: int) -> tuple[BoolArray, FloatArray, FloatArray]:
-    """Returns which cells were seen, their share of wall, and their residual, m.
-
-    The residual is the mean over the side that won.
-    """
+def _mean_residual(steps: Steps, level: BoolArray, split: int) -> FloatArray:
+    """Returns each cell's mean residual, m, over the sub-cells that are as it is."""
     residual = _blocks(steps.residual, split)
     known = np.isfinite(residual)
-    level = _blocks(steps.level, split)
-    count = known.sum(axis=2)
-    share = level.sum(axis=2) / np.maximum(count, 1)
-    winner = known & (level == (share > 0.5)[:, :, np.newaxis])
-    total = np.where(winner, residual, 0.0).sum(axis=2)
+    alike = known & (_blocks(steps.level, split) == level[:, :, np.newaxis])
+    alike = np.where(alike.any(axis=2, keepdims=True), alike, known)
+    total = np.where(alike, residual, 0.0).sum(axis=2)
     with np.errstate(invalid="ignore"):
-        mean = total / winner.sum(axis=2)
-    return count > 0, share, mean
+        mean: FloatArray = total / alike.sum(axis=2)
+    return mean
 
 
 def _spacing(

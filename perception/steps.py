@@ -6,6 +6,7 @@ itself, block by block: so it holds the errors that fusing many pictures does no
 average out (a camera's fixed pattern and ripple, errors of its pose), and plaster.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ _BLOCK = 0.25
 _LEAST_SAMPLES = 50
 _WINDOW = 5
 """Sub-cells averaged to find low steps in strong noise."""
+_HIGH = 2.0
+"""Steps of more than so many bounds are no low steps, and stay out of such means."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +37,15 @@ class SubCells(FrozenValue):
         depth: (split ny, split nx) m along T z; NaN = nothing seen.
         variance: The same shape, m²: of the depth, as far as it is independent from
             point to point; 0 where that is not known.
+        p_TQs: (3, M) m, in T: all points that are not hidden. Beside an edge a sub-cell
+            holds some of what is near and of what is far.
+        index: (M,) the sub-cell of each, row by row.
     """
 
     depth: FloatArray
     variance: FloatArray
+    p_TQs: FloatArray
+    index: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +74,14 @@ def sub_cells(
     height: float,
     cell: float,
     split: int,
+    spacing: float,
 ) -> SubCells:
     """Takes the foremost surface of each sub-cell, as the gun meets it.
 
     Of several points above one sub-cell those that were measured much less often than
     the others are ghosts; of the rest the foremost, and what lies within a layer behind
-    it, count by their measurements.
+    it, count by their measurements. What lies behind a surface that stands on all four
+    sides of it is hidden, also where no point of that surface is straight above.
 
     Args:
         p_TQs: (3, N) m, in T.
@@ -81,6 +91,7 @@ def sub_cells(
         height: Of the tile, m.
         cell: Edge of a cell, m.
         split: Sub-cells along a cell's edge.
+        spacing: Typical distance of points, m.
     """
     nx, ny = (split * round(length / cell) for length in (width, height))
     columns, rows = np.floor(p_TQs[:2] * (split / cell)).astype(np.int64)
@@ -92,9 +103,14 @@ def sub_cells(
     np.maximum.at(best, own, n)
     real = n >= _RIVAL_SHARE * best[own]
     own, z, n = own[real], z[real], n[real]
-    front = np.full(nx * ny, -np.inf)
-    np.maximum.at(front, own, z)
-    top = z >= front[own] - _LAYER
+    front = np.full((ny, nx), -np.inf)
+    np.maximum.at(front.ravel(), own, z)
+    cover = _cover(front, math.ceil(spacing * split / cell))
+    shown = z >= cover.ravel()[own] - _LAYER
+    front = np.maximum(front, cover)
+    visible = p_TQs[:, inside][:, real][:, shown]
+    index = own[shown]
+    top = z >= front.ravel()[own] - _LAYER
     own, z, n = own[top], z[top], n[top]
     total = np.bincount(own, n, nx * ny)
     depth = np.full(nx * ny, np.nan)
@@ -104,7 +120,34 @@ def sub_cells(
     if variances is not None:
         one = variances[inside][real][top]
         variance[seen] = np.bincount(own, n * one, nx * ny)[seen] / total[seen] ** 2
-    return SubCells(depth.reshape(ny, nx), variance.reshape(ny, nx))
+    return SubCells(
+        depth=depth.reshape(ny, nx),
+        variance=variance.reshape(ny, nx),
+        p_TQs=visible,
+        index=index,
+    )
+
+
+def _cover(front: FloatArray, reach: int) -> FloatArray:
+    """Returns the depth up to which things stand on all four sides of a sub-cell.
+
+    The square round it falls into four oblongs like the blades of a windmill. Beside a
+    straight edge one of them at least holds nothing of what stands farther in front.
+    """
+    ny, nx = front.shape
+    padded = np.pad(front, reach, constant_values=-np.inf)
+    first, second = range(1, reach + 1), range(reach + 1)
+    cover = np.full(front.shape, np.inf)
+    for turn in range(4):
+        blade = np.full(front.shape, -np.inf)
+        for dy, dx in ((dy, dx) for dy in first for dx in second):
+            for _ in range(turn):
+                dy, dx = dx, -dy
+            rows = slice(reach + dy, reach + dy + ny)
+            columns = slice(reach + dx, reach + dx + nx)
+            np.maximum(blade, padded[rows, columns], out=blade)
+        np.minimum(cover, blade, out=cover)
+    return cover
 
 
 def find_steps(
@@ -126,8 +169,9 @@ def find_steps(
     step = np.abs(residual) > bound
     clipped = np.clip(residual, -bound, bound)
     seen = np.isfinite(residual)
-    share = uniform_filter(seen.astype(float), _WINDOW, mode="constant")
-    mean = uniform_filter(np.where(seen, clipped, 0.0), _WINDOW, mode="constant")
+    low = seen & (np.abs(residual) <= _HIGH * bound)
+    share = uniform_filter(low.astype(float), _WINDOW, mode="constant")
+    mean = uniform_filter(np.where(low, clipped, 0.0), _WINDOW, mode="constant")
     mean = np.where(seen & ~step, mean / np.maximum(share, 1e-9), np.nan)
     _, mean_bound = _bounds(mean, 0.0 * mean, surface.noise, cell, config)
     core = np.abs(mean) > mean_bound
@@ -143,9 +187,14 @@ def _bounds(
     cell: float,
     config: SegmentationConfig,
 ) -> tuple[FloatArray, FloatArray]:
-    """Returns the standard deviation of residuals and the least significant step."""
+    """Returns the standard deviation of residuals and the least significant step.
+
+    However a place scatters, as where a column fills it, what is farther off than the
+    wall's points may be from their plane is a step.
+    """
     sigma = np.sqrt(_scatter(residual, noise, cell) ** 2 + variance)
-    return sigma, np.maximum(config.min_step, config.step_significance * sigma)
+    most = max(config.min_step, config.distance_threshold)
+    return sigma, np.clip(config.step_significance * sigma, config.min_step, most)
 
 
 def _scatter(residual: FloatArray, noise: float, cell: float) -> FloatArray:
