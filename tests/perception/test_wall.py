@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from perception.config import SegmentationConfig
-from perception.errors import NoWallError
+from perception.errors import AmbiguousWallError, NoWallError
 from perception.synthetic import synthetic_wall
 from perception.wall import find_wall
 
@@ -123,3 +123,28 @@ def test_steps_on_a_wall_do_not_make_a_wall_aslant():
     tilt = np.degrees(np.arccos(X_found.rotation().matrix()[2, 2]))
     assert tilt < 0.1
     assert abs(X_found.translation()[2]) < 0.001
+
+
+def test_two_walls_side_by_side_10_cm_apart_are_ambiguous():
+    left = wall_points(RigidTransform([0.0, 0.0, 0.05]))
+    right = wall_points(RigidTransform([0.0, 0.0, -0.05]), seed=1)
+    x = (X_WT_NOMINAL.inverse() @ left)[0]
+    x_right = (X_WT_NOMINAL.inverse() @ right)[0]
+    points = np.concatenate([left[:, x < 1.0], right[:, x_right >= 1.0]], axis=1)
+    with pytest.raises(AmbiguousWallError, match=r"0\.100 m apart"):
+        find(points)
+
+
+def test_floor_larger_than_the_wall_is_not_the_wall():
+    rng = np.random.default_rng(2)
+    floor = rng.uniform([-2.0, -3.0, -0.002], [1.0, 3.0, 0.002], (60000, 3)).T
+    points = np.concatenate([wall_points(), floor], axis=1)
+    up_W = np.array([0.0, 0.0, 1.0])
+    wall = find_wall(
+        points, X_WT_NOMINAL, **SIZE, config=SegmentationConfig(), seed=1, up_W=up_W
+    )
+    assert wall.X_WT.translation()[0] == pytest.approx(1.05, abs=1e-3)
+    with pytest.raises(NoWallError, match="level, as floors are"):
+        find_wall(
+            floor, X_WT_NOMINAL, **SIZE, config=SegmentationConfig(), seed=1, up_W=up_W
+        )
