@@ -64,10 +64,10 @@ def bus():
     bus = load_bus(models_path("bus", "painter.bus.yaml"))
     bus = dataclasses.replace(bus, interface="socketcan", channel=CHANNEL, cycle=0.04)
     bus.timeouts = dataclasses.replace(
-        bus.timeouts, heartbeat=3.0, tpdo=2.0, setpoint=2.0, boot=20.0, sdo=2.0,
-        brake=20.0, transition=20.0, rpdo_cycles=200,
+        bus.timeouts, heartbeat=20.0, tpdo=20.0, setpoint=20.0, boot=60.0, sdo=5.0,
+        brake=60.0, transition=60.0, rpdo_cycles=1000,
     )  # fmt: skip
-    bus.io = dataclasses.replace(bus.io, rpdo_cycles=200)
+    bus.io = dataclasses.replace(bus.io, rpdo_cycles=1000)
     return bus
 
 
@@ -124,10 +124,13 @@ def test_bus_off_stops_the_arm_and_an_acknowledgement_starts_it(enabled, tmp_pat
     assert "bus-off" in report.feedback.reason
     recover(enabled)
     move(enabled, np.full(5, 0.05))
-    enabled.close()
-    frames = [record.frame for record in read_log(tmp_path / "bus.log").records]
-    errors = [frame for frame in frames if frame.is_error]
-    assert [frame.cob_id for frame in errors] == [ERROR_BUS_OFF]
+
+    def errors():
+        records = read_log(tmp_path / "bus.log").records
+        return [record.frame.cob_id for record in records if record.frame.is_error]
+
+    wait_for(errors, "no error frame in the log")
+    assert errors() == [ERROR_BUS_OFF]
 
 
 def test_a_link_that_goes_down_stops_the_arm_until_it_is_back(enabled, drives):
