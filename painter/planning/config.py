@@ -127,7 +127,8 @@ class RasterConfig:
 
     Attributes:
         speed: Gun speed on a stroke, m/s.
-        standoff: Distance from nozzle to wall along the spray axis, m.
+        standoff: Distance from nozzle to wall along the spray axis, m. From 0.315 m a
+            fan of 25 cm at 0.30 m fills 2 m in 14 strokes at its best pitch, not 15.
         overlap_pitch: Distance between strokes, m; 0 = the pitch of least variance for
             the tip, 2 pi a / j(gamma + 1/2, 1), spread to fill the tile's width.
         lead: Gun stays on this far beyond the edge of what is to be painted, m.
@@ -144,14 +145,14 @@ class RasterConfig:
     """
 
     speed: float = 0.6
-    standoff: float = 0.30
+    standoff: float = 0.315
     overlap_pitch: float = 0.0
     lead: float = 0.005
     keepout_margin: float = 0.0
     min_stroke: float = 0.03
     wall_share: float = 0.5
     cut_in: bool = True
-    cut_in_standoff: float = 0.12
+    cut_in_standoff: float = 0.10
     direction: str = "vertical"
     zones: list[ZoneConfig] = dataclasses.field(default_factory=list)
 

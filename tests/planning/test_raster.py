@@ -57,7 +57,7 @@ def pair(mask, strokes, setting):
 
 def test_pitch_fills_the_width_with_no_strip_left_over():
     pitch = nominal_pitch(2.0, tip=TIP, raster=raster())
-    assert pitch == pytest.approx(2.0 / 15)  # 2 / 0.1363 = 14.7 lines.
+    assert pitch == pytest.approx(2.0 / 14)  # 2 / 0.1431 = 13.98 lines.
     assert nominal_pitch(2.0, tip=TIP, raster=raster(overlap_pitch=0.1)) == 0.1
 
 
@@ -71,12 +71,12 @@ def test_share_is_one_on_wall_and_half_at_its_edge():
 
 def test_blank_wall_has_evenly_spaced_full_strokes():
     strokes = plan(wall())
-    assert len(strokes) == 15
+    assert len(strokes) == 14
     x = np.array([s.start_T[0] for s in strokes])
     gaps = np.diff(x)
     # Places are 1/64 of a pitch apart: 2 mm.
-    assert np.ptp(gaps) <= 0.0022
-    assert gaps.max() <= 1.02 * best_pitch(TIP, 0.3) + 1e-9
+    assert np.ptp(gaps) <= 2 * 0.00224
+    assert gaps.max() <= 1.02 * best_pitch(TIP, raster().standoff) + 1e-9
     assert x[0] == pytest.approx(2.0 - x[-1], abs=0.005)
     for stroke in strokes:
         ends = sorted((stroke.start_T[1], stroke.end_T[1]))
