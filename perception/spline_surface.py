@@ -38,6 +38,10 @@ class SplineSurface:
             within: (2, 2) m, lowest and highest y, and x, that the splines cover.
             knot: Largest distance of knots, m.
         """
+        # The band is as wide as the shorter side is long.
+        self._turned = bool(np.ptp(within[1]) > np.ptp(within[0]))
+        if self._turned:
+            y, x, within = x, y, within[::-1]
         self._within, self._knot = within, knot
         self._along = _basis(y, within[0], knot)
         self._across = _basis(x, within[1], knot)
@@ -61,11 +65,13 @@ class SplineSurface:
             penalty: Weight of the roughness.
 
         Returns:
-            Coefficients (ky, kx).
+            The surface's coefficients.
 
         Raises:
             ValueError: The weights are no numbers that determine a surface.
         """
+        if self._turned:
+            weight, values = weight.T, values.T
         ky, kx = self._along.shape[1], self._across.shape[1]
         products = (self._pairs_y.T @ weight @ self._pairs_x).reshape(
             _SPAN, ky, _SPAN, kx
@@ -91,17 +97,18 @@ class SplineSurface:
     def heights(self, coefficients: FloatArray) -> FloatArray:
         """Returns the surface (ny, nx) at the places that it was laid over."""
         height: FloatArray = self._along @ coefficients @ self._across.T
-        return height
+        return height.T if self._turned else height
 
     def heights_at(
         self, y: FloatArray, x: FloatArray, coefficients: FloatArray
     ) -> FloatArray:
         """Returns the surface over another grid, y (n,) by x (m,), m."""
+        if self._turned:
+            y, x = x, y
         along = _basis(y, self._within[0], self._knot)
-        height: FloatArray = (
-            along @ coefficients @ _basis(x, self._within[1], self._knot).T
-        )
-        return height
+        across = _basis(x, self._within[1], self._knot)
+        height: FloatArray = along @ coefficients @ across.T
+        return height.T if self._turned else height
 
 
 def _basis(at: FloatArray, within: FloatArray, knot: float) -> FloatArray:

@@ -20,6 +20,8 @@ plate of 0.2 m is bridged and not climbed; closer knots are for walls that need 
 _SCATTER, _FOLLOWED = 0.0015, 2.5
 """A wall is followed if it scatters less than this about its surface, m, or than so
 many times its noise."""
+_MOST_SPLINES = 4096
+"""As many as lie on 256 m² 0.25 m apart; on larger tiles they lie farther apart."""
 _FINEST = 0.2
 """Blocks larger than this share of the closer knots' distance cannot place a step; the
 spline would climb what stands on the wall."""
@@ -100,7 +102,9 @@ def fit_piece(blocks: Blocks, cells: BoolArray) -> Piece:
         ValueError: There is no surface in them.
     """
     height = plane_heights(blocks, cells)
-    for knot in _KNOTS:
+    least = math.sqrt(float(np.prod(np.ptp(blocks.within, axis=1))) / _MOST_SPLINES)
+    for distance in _KNOTS:
+        knot = max(distance, least)
         spline = SplineSurface(blocks.y, blocks.x, within=blocks.within, knot=knot)
         piece = _settle(spline, blocks, cells, height, penalties=_PENALTIES)
         # 1.645: nine tenths of a normal variable are closer to its mean.

@@ -232,8 +232,8 @@ def make(seed, folder):
     return folder / name, what
 
 
-def attempt(path):
-    """Reads and segments; returns the outcome."""
+def attempt(path, *, fine):
+    """Reads and segments, by fine steps or not; returns the outcome."""
     try:
         cloud = read_input(path, intrinsics=None, unit=Unit.M)
         found = segment_recorded(
@@ -243,6 +243,7 @@ def attempt(path):
             p_WC=cloud.p_WC,
             fit_cell=True,
             fit_inlier_distance=True,
+            fine=fine,
         )
         json.dumps(segmentation_figures(found), allow_nan=False)
         result = found.steps.segmentation
@@ -265,7 +266,7 @@ def main(first, last, folder):
         print(json.dumps({"seed": seed, "file": path.name, "what": what}), flush=True)
         start = time.perf_counter()
         signal.alarm(TIMEOUT)
-        outcome = attempt(path)
+        outcome = attempt(path, fine=seed % 2 == 1)
         signal.alarm(0)
         seconds = time.perf_counter() - start
         print(json.dumps({"seed": seed, "outcome": outcome, "s": round(seconds, 2)}))

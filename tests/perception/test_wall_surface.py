@@ -164,3 +164,21 @@ def test_splines_of_a_facade_solve_as_dense_least_squares_do():
     solved, *_ = np.linalg.lstsq(rows, right, rcond=None)
     # The small ridge that keeps the band regular is 1e-6 of a cell's weight.
     np.testing.assert_allclose(height.ravel(), design @ solved, atol=1e-5)
+
+
+def test_splines_of_a_long_wall_are_those_of_a_high_one_turned():
+    rng = np.random.default_rng(3)
+    long, short = np.linspace(0.0, 2.0, 40), np.linspace(0.0, 0.5, 11)
+    within = np.array([[0.0, 0.5], [0.0, 2.0]])
+    weight, values = rng.random((2, 11, 40))
+    wide = SplineSurface(short, long, within=within, knot=0.2)
+    high = SplineSurface(long, short, within=within[::-1], knot=0.2)
+    np.testing.assert_allclose(
+        wide.heights(wide.solve(weight, values, 1.0)),
+        high.heights(high.solve(weight.T, values.T, 1.0)).T,
+        atol=1e-9,
+    )
+    coefficients = wide.solve(weight, values, 1.0)
+    np.testing.assert_allclose(
+        wide.heights_at(short, long, coefficients), wide.heights(coefficients)
+    )
