@@ -64,7 +64,7 @@ def bus():
     bus = load_bus(models_path("bus", "painter.bus.yaml"))
     bus = dataclasses.replace(bus, interface="socketcan", channel=CHANNEL, cycle=0.04)
     bus.timeouts = dataclasses.replace(
-        bus.timeouts, heartbeat=20.0, tpdo=20.0, setpoint=20.0, boot=60.0, sdo=5.0,
+        bus.timeouts, heartbeat=20.0, tpdo=20.0, setpoint=20.0, boot=10.0, sdo=5.0,
         brake=60.0, transition=60.0, rpdo_cycles=1000,
     )  # fmt: skip
     bus.io = dataclasses.replace(bus.io, rpdo_cycles=1000)
@@ -150,13 +150,18 @@ def test_a_link_that_goes_down_stops_the_arm_until_it_is_back(enabled, drives):
 def recover(process):
     """Acknowledges until the arm is enabled: the bus takes a moment to be back."""
 
+    seen = []
+
     def is_enabled():
-        if process.report().feedback.phase == Phase.STOPPED:
+        report = process.report()
+        feedback = report.feedback
+        seen.append((feedback.phase, feedback.reason, report.refusal))
+        if feedback.phase == Phase.STOPPED:
             process.acknowledge()
             time.sleep(0.5)
-        return process.report().feedback.phase == Phase.ENABLED
+        return feedback.phase == Phase.ENABLED
 
-    wait_for(is_enabled, "not enabled again")
+    wait_for(is_enabled, seen)
 
 
 def test_a_link_reports_errors_and_opens_again():
