@@ -41,6 +41,8 @@ STATION_TO_BRAIN = (
     "wall_camera.image_time",
 )
 BRAIN_TO_STATION = ("arm.desired_state", "gun.trigger")
+# A camera may be silent for up to 3 s before it counts as missing, s.
+JOINT_HISTORY = 4.0
 
 
 def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diagram:
@@ -62,7 +64,10 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
     X_WT_expected = nominal_tile_pose(scenario.tile)
     period = scenario.cycle.period
     add = builder.AddNamedSystem
-    camera_pose = add("camera_pose", CameraPose(kinematics=planner.kinematics))
+    camera_pose = add(
+        "camera_pose",
+        CameraPose(kinematics=planner.kinematics, length=JOINT_HISTORY),
+    )
     accumulator = add(
         "map_accumulator",
         MapAccumulator(
