@@ -16,6 +16,7 @@ from painter.canopen.sim.load import Load
 from painter.canopen.sim.rack import STEP, Rack
 
 _MOST_BEHIND = 0.1
+_MOST_AT_ONCE = 2.0 * STEP
 
 
 class LocalHub:
@@ -167,7 +168,8 @@ class RackServer:
                 self.rack.advance(when)
             if not frame.is_error:  # Of this computer's controller; no node sees it.
                 self._send(frame, when)
-        self.rack.advance(now)
+        # Held up, it goes on in short steps: there may be frames to be read between.
+        self.rack.advance(min(now, self.rack.now + _MOST_AT_ONCE))
 
     def _sync_time(self, now: float) -> float:
         """Returns when a SYNC came: when it was due, if this process was held up since.
