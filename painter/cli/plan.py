@@ -90,7 +90,7 @@ def plan(
     """Plan the paint program of a segmented wall.
 
     The arm starts and ends at its home pose. Writes program.json, trajectory.npz,
-    program.png and film.png, the film that the strokes will leave.
+    program.png and film.png, the film after the strokes.
 
     Raises:
         InputError: The options do not go together or name nothing to be read.
@@ -122,7 +122,9 @@ def plan(
         compute_time = time.perf_counter() - start
         show(0.8, "files")
         asked = wall.replace(wall_mask=planner.wanted(wall))
-        preview = preview_film(program.strokes, asked, tip=planner.tip, nominal=nominal)
+        preview = preview_film(
+            program.strokes, asked, tip=planner.tip, nominal=nominal, before=film
+        )
         save_program(folder, program, preview)
         (folder / PICTURE_FILE).write_bytes(png(stroke_picture(program, wall)))
         drawn = preview_picture(preview, asked, nominal)
@@ -150,5 +152,6 @@ def _film_to_mend(
     if mark is None:
         return None
     corners = mark_corners("--mark", mark)
-    marked = marked_cells(corners, wall.wall_mask.shape, wall.cell)
-    return np.pad(np.where(marked, 0.0, nominal), margin_cells(wall.cell), mode="edge")
+    mask = np.asarray(wall.wall_mask)
+    bare = marked_cells(corners, mask.shape, wall.cell) | ~mask
+    return np.pad(np.where(bare, 0.0, nominal), margin_cells(wall.cell))
