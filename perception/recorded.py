@@ -31,6 +31,7 @@ from perception.wall import MIN_POINTS, upright_rotation, wall_on_plane
 from perception.wall_choice import choose_wall
 
 MAX_CELLS = 4_000_000
+_MOST_FINE_CELLS = 400_000  # Of which each is looked at in up to 16 parts.
 # Points farther than this from the median are no part of any wall a robot paints, and
 # such numbers leave no digits for the rest.
 _STRAY = 1000.0
@@ -132,7 +133,8 @@ def segment_recorded(
     cell = least_cell = config.cell
     if fit_cell:
         cell = fitting_cell(p_TQs[:2], least=cell)
-        cell = max(cell, math.sqrt(size[0] * size[1] / MAX_CELLS))
+        most = _MOST_FINE_CELLS if fine else MAX_CELLS
+        cell = max(cell, math.sqrt(size[0] * size[1] / most))
     # An extent from the data is a whole number of cells.
     tile = {
         "width": size[0] if width is not None else _whole(size[0], cell),
