@@ -103,7 +103,7 @@ def plan_stations(
     if height > tile.height:
         rows = math.ceil((height - _OVERLAP) / (tile.height - _OVERLAP) - 1e-9)
     step = (height - _OVERLAP) / rows if rows > 1 else height
-    x_lines = (np.arange(lines) + 0.5) * pitch
+    x_lines = pitch * np.arange(0.5, lines)
     painted = _painted(x_lines, width, height, zones, tip=tip, raster=raster)
     stations: list[Station] = []
     for row in range(rows):

@@ -188,12 +188,12 @@ def fastest_joint_blend(
     def allowed(durations: FloatArray) -> BoolArray:
         first, second = plateaus(start, end, durations)
         peak = np.maximum(np.abs(first), np.abs(second))
-        keeps = (peak <= SEARCH_SHARE * limits.a_max).all(axis=1)
+        keeps = np.asarray((peak <= SEARCH_SHARE * limits.a_max).all(axis=1))
         if keeps.any():
             q, v = evaluate(start, end, durations[keeps], s)
             slow = (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
             keeps[keeps] = slow & limits.contains(q).all(axis=1)
-        return np.asarray(keeps)
+        return keeps
 
     def certain(duration: float) -> bool:
         return keeps_limits(JointBlend(start, end, duration).q, duration, limits)
