@@ -70,8 +70,8 @@ def test_rpm_drives_get_rpm(makers):
     maxon = lab.rack.drives["base_yaw"].store
     assert maxon.number(0x607F) == np.ceil(rpm)
     assert maxon.number(0x6080) == np.ceil(rpm)
-    # 10 rad/s2 in rpm/s.
-    assert maxon.number(0x6085) == np.floor(10.0 * 100 * 60 / (2 * np.pi))
+    # The quick stop's 20 rad/s2 in rpm/s.
+    assert maxon.number(0x6085) == np.floor(20.0 * 100 * 60 / (2 * np.pi))
 
 
 def test_what_a_drive_cannot_be_told_is_said(makers):
