@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from painter.planning.film_fit import LEAST_FLOW
 from painter.planning.linker import Linker
 from painter.planning.reach import require_reach
 from painter.planning.spray_path import SkippedStroke, Stroke
@@ -15,6 +16,8 @@ _STEP = 0.03  # m along a stroke, between the places that are looked at.
 _STOPPING = 0.12
 # m beyond a stroke's end and away from the wall: where the arm stops, and on the way.
 _RUN_OUT = ((0.10, 0.03), (0.05, 0.01))
+_SLOWER = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)  # Shares of a stroke's speed, in turn.
+_TOO_BENT = "the wall's surface bends too sharply for the joints at this speed"
 # Share of the strokes' length; if more is out of reach the arm stands in the wrong
 # place.
 _MOST_OUT_OF_REACH = 0.05
@@ -24,6 +27,8 @@ def clear_strokes(
     strokes: Sequence[Stroke], linker: Linker, min_stroke: float
 ) -> tuple[list[Stroke], list[SkippedStroke]]:
     """Cuts strokes back to what keeps clear.
+
+    On a wall that is not flat, strokes that the joints cannot follow are slowed first.
 
     Args:
         strokes: In T.
@@ -38,8 +43,10 @@ def clear_strokes(
     """
     if not strokes:
         return [], []
-    counts = [max(2, int(np.ceil(stroke.length / _STEP)) + 1) for stroke in strokes]
-    shares = [np.linspace(0.0, 1.0, count) for count in counts]
+    if linker.gun.surface is not None:
+        strokes = [_slowed(stroke, linker) for stroke in strokes]
+    shares = [_shares(stroke) for stroke in strokes]
+    counts = [share.size for share in shares]
     # All at once: to ask for one place takes as long as to ask for fifty.
     p_TGs = np.concatenate(
         [
@@ -58,6 +65,10 @@ def clear_strokes(
         require_reach(outside, gun=linker.gun, limits=linker.limits, what="strokes")
     free = np.array(reached)
     free[reached] = linker.space.free(q[reached])
+    turns = np.ones(len(q), dtype=bool)
+    if linker.gun.surface is not None:
+        turns = np.concatenate([_keeps_rates(stroke, linker) for stroke in strokes])
+    free &= turns
     clear: list[Stroke] = []
     skipped: list[SkippedStroke] = []
     ends = np.cumsum(counts)
@@ -66,7 +77,9 @@ def clear_strokes(
         if free[rows].all():
             clear.append(stroke)
             continue
-        kept, lost = _cut_back(stroke, q[rows], free[rows], linker, min_stroke)
+        kept, lost = _cut_back(
+            stroke, q[rows], free[rows], turns[rows], linker, min_stroke
+        )
         clear += kept
         skipped += lost
     return clear, skipped
@@ -98,13 +111,47 @@ def has_run_out(strokes: Sequence[Stroke], linker: Linker) -> BoolArray:
     return np.asarray(free.reshape(len(strokes), -1).all(axis=1))
 
 
+def _shares(stroke: Stroke) -> FloatArray:
+    """Returns the shares (n,) of a stroke's length at which it is looked at."""
+    return np.linspace(0.0, 1.0, max(2, int(np.ceil(stroke.length / _STEP)) + 1))
+
+
+def _slowed(stroke: Stroke, linker: Linker) -> Stroke:
+    """Slows a stroke until the joints can follow it over a bent wall.
+
+    Its flow falls by as much, so that its film stays. A stroke that half its speed does
+    not help is returned as it was.
+    """
+    for factor in _SLOWER:
+        slower = stroke.replace(speed=factor * stroke.speed, flow=factor * stroke.flow)
+        enough = slower.flow >= min(LEAST_FLOW, stroke.flow)
+        if enough and _keeps_rates(slower, linker).all():
+            return slower
+    return stroke
+
+
+def _keeps_rates(stroke: Stroke, linker: Linker) -> BoolArray:
+    """Tells of a stroke's places (n,) where the joints can follow it at its speed."""
+    travel = stroke.end_T - stroke.start_T
+    p_TGs = nozzle_points(
+        stroke.start_T + np.outer(_shares(stroke), travel), stroke.standoff
+    )
+    v_TG = np.append(travel * (stroke.speed / stroke.length), 0.0)
+    return linker.gun.keeps_rates(p_TGs, v_TG, linker.limits)
+
+
 def nozzle_points(p_T: FloatArray, standoff: float) -> FloatArray:
     """Returns nozzle positions (n, 3), m, over wall points (n, 2), in T."""
     return np.column_stack([p_T, np.full(len(p_T), standoff)])
 
 
 def _cut_back(
-    stroke: Stroke, q: FloatArray, free: BoolArray, linker: Linker, min_stroke: float
+    stroke: Stroke,
+    q: FloatArray,
+    free: BoolArray,
+    turns: BoolArray,
+    linker: Linker,
+    min_stroke: float,
 ) -> tuple[list[Stroke], list[SkippedStroke]]:
     """Returns what stays of a stroke that is free at some of evenly spaced places."""
     share = np.linspace(0.0, 1.0, len(free))
@@ -125,10 +172,14 @@ def _cut_back(
         elif is_free:
             skipped.append(SkippedStroke(part, "shorter than raster.min_stroke"))
         else:
-            middle = q[(first + last) // 2]
-            reached = linker.limits.contains(middle[None])[0]
-            blocked = linker.space.worst_pair(middle) if reached else None
-            skipped.append(SkippedStroke(part, blocked or "out of the arm's reach"))
+            middle = (first + last) // 2
+            if not linker.limits.contains(q[[middle]])[0]:
+                reason = "out of the arm's reach"
+            elif not turns[middle]:
+                reason = _TOO_BENT
+            else:
+                reason = linker.space.worst_pair(q[middle])
+            skipped.append(SkippedStroke(part, reason))
     return clear, skipped
 
 

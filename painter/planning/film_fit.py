@@ -23,7 +23,7 @@ _REPEATS = 4  # Of a step that helped.
 # fan, which stays level, would be dragged too far along its own axis.
 _SHORTEST_LEANING = 0.15  # m
 MOST_LEAN = 0.3
-_LEAST_FLOW = 0.08  # A valve does not dose less.
+LEAST_FLOW = 0.08  # A valve does not dose less.
 _GAIN = 1e-6  # m², least gain of a step.
 # The gun's half width and the clearance around it, m, and the clearance before it.
 _GUN_REACH = 0.07
@@ -154,7 +154,7 @@ class FilmFit:
             trial = trial._replace(flow=span.flow * trial.standoff / span.standoff)
             if not raster.cut_in_standoff <= trial.standoff <= raster.standoff:
                 return None
-        if not _LEAST_FLOW <= trial.flow <= 1.0 + 1e-9:
+        if not LEAST_FLOW <= trial.flow <= 1.0 + 1e-9:
             return None
         if trial.high - trial.low < raster.min_stroke:
             return None

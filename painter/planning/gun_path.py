@@ -1,6 +1,8 @@
 """Paths of the gun's nozzle in front of the wall, timed by construction.
 
-The gun stays square to the wall, so a path is the nozzle's position in T over time.
+The gun stays square to the wall, so a path is the nozzle's place before it over time:
+x, y and distance, which are its position in T where the wall is flat, and are laid on
+the wall's surface where it is not.
 Passes run at constant speed; blends join two passes. A blend's duration is the shortest
 that the joints allow, found on densely evaluated inverse kinematics instead of being
 left to a time parametriser, which can fail without saying so.
@@ -15,6 +17,7 @@ from pydrake.math import RigidTransform
 from painter.planning.blend import KNOTS, MovingState, evaluate
 from painter.planning.joint_motion import SEARCH_SHARE, keeps_limits, shortest
 from painter.planning.kinematics import ArmKinematics, ArmLimits
+from painter.planning.surface_frame import SurfaceFrame
 from perception.values import BoolArray, FloatArray, FrozenValue
 
 _SAMPLES = 49  # Of a blend, where its joint rates are looked at.
@@ -125,24 +128,66 @@ class SquareGun(FrozenValue):
     Attributes:
         kinematics: Of the arm.
         X_WT: Tile frame T in W.
+        surface: Of the wall; None = T's plane.
     """
 
     kinematics: ArmKinematics
     X_WT: RigidTransform
+    surface: SurfaceFrame | None = None
 
     def solve(self, p_TGs: FloatArray) -> FloatArray:
         """Returns joint angles with the nozzle at points before the wall.
 
         Args:
-            p_TGs: (..., 3) m, in T.
+            p_TGs: (..., 3) m, in T; before a `surface`, places on it.
 
         Returns:
             (..., 5) rad, elbow up; NaN where the arm does not reach.
         """
-        p_WGs = (self.X_WT @ np.reshape(p_TGs, (-1, 3)).T).T
+        points = np.reshape(p_TGs, (-1, 3))
         axis_W = -self.X_WT.rotation().col(2)
+        if self.surface is not None:
+            points, normals = self.surface.points(points)
+            axis_W = -(self.X_WT.rotation().matrix() @ normals.T).T
+        p_WGs = (self.X_WT @ points.T).T
         q = self.kinematics.solve(p_WGs, axis_W)
         return q.reshape((*np.shape(p_TGs)[:-1], 5))
+
+    def place(self, p_WG: FloatArray) -> FloatArray:
+        """Returns where a nozzle (3,), m in W, is before the wall, as `solve` takes it.
+
+        Near a `surface` this is its foot there and its distance; see
+        `SurfaceFrame.places`.
+        """
+        p_TG = np.asarray(self.X_WT.inverse() @ p_WG)
+        return p_TG if self.surface is None else self.surface.places(p_TG[None])[0]
+
+    def keeps_rates(
+        self, p_TGs: FloatArray, v_TGs: FloatArray, limits: ArmLimits
+    ) -> BoolArray:
+        """Tells where the joints can follow a nozzle that goes over the wall.
+
+        Args:
+            p_TGs: (n, 3) m, as `solve` takes them.
+            v_TGs: (n, 3) or (3,) m/s, rates of these.
+            limits: Of the joints, as far as the plan may use them.
+
+        Returns:
+            (n,) bool; False also where the arm does not reach.
+        """
+        before, q, after = (
+            self.solve(p_TGs + time * v_TGs) for time in (-_DIFFERENCE, 0, _DIFFERENCE)
+        )
+        v = (after - before) / (2.0 * _DIFFERENCE)
+        a = (after - 2.0 * q + before) / _DIFFERENCE**2
+        with np.errstate(invalid="ignore"):
+            keeps = np.abs(v) <= SEARCH_SHARE * limits.v_max
+            keeps &= np.abs(a) <= SEARCH_SHARE * limits.a_max
+        if limits.torques is not None:
+            known = np.flatnonzero(np.isfinite(q).all(axis=1))
+            torques = limits.torques(q[known], v[known], a[known])
+            keeps[known] &= np.abs(torques) <= limits.effort_max
+        return np.asarray(keeps.all(axis=1))
 
     def joint_state(self, nozzle: MovingState) -> MovingState:
         """Returns the joints' state for a nozzle in T at constant velocity.

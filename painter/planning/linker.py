@@ -161,7 +161,7 @@ class Linker(FrozenValue):
     def _drawn_over(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
         """Returns moves of the square gun from rest to rest over a hop."""
         _, p_WGs = self.gun.kinematics.gun_poses(np.stack([q0, q1]))
-        p_TGs = (self.gun.X_WT.inverse() @ p_WGs.T).T
+        p_TGs = np.array([self.gun.place(p_WG) for p_WG in p_WGs])
         if not np.allclose(self.gun.solve(p_TGs), [q0, q1], atol=_SQUARE):
             return []
         start, end = (MovingState.at_rest(p_TG) for p_TG in p_TGs)
@@ -208,7 +208,7 @@ class Linker(FrozenValue):
     def _drawn_back(self, q: FloatArray) -> list[FloatArray]:
         """Returns the pose with the gun drawn farthest back from the wall, if any."""
         _, p_WGs = self.gun.kinematics.gun_poses(q[None])
-        p_TG = self.gun.X_WT.inverse() @ p_WGs[0]
+        p_TG = self.gun.place(p_WGs[0])
         backs = self.gun.solve(p_TG + np.outer(_DRAWN_BACK, [0.0, 0.0, 1.0]))
         good = self.limits.contains(backs)
         good[good] = self.space.free(backs[good])

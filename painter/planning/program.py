@@ -23,6 +23,7 @@ from painter.planning.obstacles import ClearSpace, segmentation_boxes
 from painter.planning.raster import plan_strokes, raster_film
 from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
 from painter.planning.stroke_order import order_strokes
+from painter.planning.surface_frame import SurfaceFrame, above_wall
 from painter.planning.touch_up import touch_up_strokes
 from painter.planning.verify import verify_motion, verify_strokes
 from painter.planning.zones import in_zones
@@ -40,7 +41,8 @@ class ProgramPlanner(FrozenValue):
 
     Strokes that come nearer than the clearance to an obstacle, or out of reach, are cut
     back; what is cut, and strokes that cannot be come to, stand in the program's
-    `skipped`.
+    `skipped`. Where the wall is not flat the gun follows its surface; see
+    `SurfaceFrame`.
 
     Attributes:
         kinematics: Of the arm.
@@ -65,7 +67,7 @@ class ProgramPlanner(FrozenValue):
             segmentation.cell,
             tip=self.tip,
             raster=self.raster,
-            height=np.asarray(segmentation.depth, dtype=np.float64),
+            height=above_wall(segmentation),
         )
 
     def wanted(self, segmentation: WallSegmentation) -> BoolArray:
@@ -82,7 +84,7 @@ class ProgramPlanner(FrozenValue):
             segmentation: Of the tile.
             film: m, on the tile and `margin_cells` around it.
         """
-        depth = np.asarray(segmentation.depth, dtype=np.float64)
+        depth = above_wall(segmentation)
         return touch_up_strokes(
             film,
             Site.of_tile(self.wanted(segmentation), segmentation.cell, depth),
@@ -115,7 +117,8 @@ class ProgramPlanner(FrozenValue):
             MotionLimitError: The finished motion fails its verification.
         """
         motion, limits = self.motion, self.limits
-        gun = SquareGun(self.kinematics, segmentation.X_WT)
+        surface = SurfaceFrame.of_wall(segmentation)
+        gun = SquareGun(self.kinematics, segmentation.X_WT, surface)
         space = ClearSpace(
             self.checker,
             X_WT=segmentation.X_WT,
@@ -133,7 +136,7 @@ class ProgramPlanner(FrozenValue):
         rests = []
         for q in (q0, linker.q_home):
             _, p_WGs = self.kinematics.gun_poses(q[None])
-            rests.append(gun.X_WT.inverse() @ p_WGs[0])
+            rests.append(gun.place(p_WGs[0]))
         ordered = order_strokes(clear, *rests)
         path, strokes, passes, unlinked = _linked(ordered, q0, linker)
         starts = start_times(path)[:-1]
@@ -162,7 +165,10 @@ class ProgramPlanner(FrozenValue):
             what="program",
         )
         verify_strokes(
-            program, kinematics=self.kinematics, valve_delay=self.tip.valve_delay
+            program,
+            kinematics=self.kinematics,
+            valve_delay=self.tip.valve_delay,
+            surface=surface,
         )
         return program
 

@@ -7,6 +7,7 @@ from painter.errors import MotionLimitError
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.obstacles import ClearSpace
 from painter.planning.spray_path import Motion, PaintProgram
+from painter.planning.surface_frame import SurfaceFrame
 from perception.values import FloatArray, IntArray
 
 _STEP = 0.002  # s, of the resampled motion.
@@ -72,14 +73,22 @@ def verify_motion(
 
 
 def verify_strokes(
-    program: PaintProgram, *, kinematics: ArmKinematics, valve_delay: float
+    program: PaintProgram,
+    *,
+    kinematics: ArmKinematics,
+    valve_delay: float,
+    surface: SurfaceFrame | None = None,
 ) -> None:
     """Checks gun speed, stand-off, angle and place while the paint flows.
+
+    Stand-off and angle are against the wall's surface; the speed is that of the
+    nozzle's foot there, along T.
 
     Args:
         program: As it will be executed; stroke i flows in `spray_on` row i.
         kinematics: Of the arm.
         valve_delay: From trigger to flow, opening and closing, s.
+        surface: Of the wall; None = T's plane.
 
     Raises:
         MotionLimitError: Names stroke, time, quantity, value and bound.
@@ -109,7 +118,17 @@ def verify_strokes(
         opens, closes = opened[number]
         along = (stroke.end_T - stroke.start_T) / stroke.length
         ideal = stroke.start_T + np.outer((time - opens) * stroke.speed, along)
-        off_axis_deg = np.rad2deg(np.arccos(np.clip(-axis_T[:, 2], -1.0, 1.0)))
+        if surface is None:
+            cosine = -axis_T[:, 2]
+        else:
+            places = np.column_stack([ideal, np.full(len(ideal), stroke.standoff)])
+            wanted, normals = surface.points(places)
+            cosine = -np.sum(axis_T * normals, axis=1)
+            off = p_TG - wanted
+            before = np.sum(off * normals, axis=1)
+            p_TG = places + off - before[:, None] * normals
+            p_TG[:, 2] = stroke.standoff + before
+        off_axis_deg = np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0)))
         step = time[1] - time[0]
         speed = np.linalg.norm(np.diff(p_TG[:, :2], axis=0), axis=1) / step
         end = stroke.start_T + along * stroke.speed * (closes - opens)
