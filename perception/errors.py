@@ -13,6 +13,12 @@ class CloudReadError(PerceptionError):
     exit_code = 2
 
 
+class GridSizeError(PerceptionError):
+    """A tile has more cells than are worked on."""
+
+    exit_code = 2
+
+
 class NoWallError(PerceptionError):
     """There is no wall where one is expected, or not enough of one."""
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from perception.config import SegmentationConfig
-from perception.errors import NoWallError
+from perception.errors import GridSizeError, NoWallError
 from perception.planes import fit_plane
 from perception.recorded_tile import (
     ViewSide,
@@ -31,7 +31,7 @@ from perception.wall import MIN_POINTS, upright_rotation, wall_on_plane
 from perception.wall_choice import choose_wall
 
 MAX_CELLS = 4_000_000
-_MOST_FINE_CELLS = 400_000  # Of which each is looked at in up to 16 parts.
+MAX_FINE_CELLS = 400_000  # Of which each is looked at in up to 16 parts.
 # Points farther than this from the median are no part of any wall a robot paints, and
 # such numbers leave no digits for the rest.
 _STRAY = 1000.0
@@ -93,7 +93,8 @@ def segment_recorded(
             its tolerance.
         p_WC: (3,) where the sensor was, in W; if left out, see `side_of_view`.
         fit_cell: Whether cells may be larger than `config.cell` where the points are
-            too sparse for it; then gaps of one or two cells are closed, too.
+            too sparse for it or the tile is too large; then gaps of one or two cells
+            are closed, too.
         fit_inlier_distance: Whether the wall's points may be taken closer than within
             `config.distance_threshold` where there is little noise.
         set_back: How far behind the wall's plane parts of the wall may lie that it
@@ -106,6 +107,8 @@ def segment_recorded(
 
     Raises:
         NoWallError: There are too few points or no such plane; names the reasons.
+        GridSizeError: The tile has more than `MAX_CELLS` of the cells asked for, or by
+            fine steps `MAX_FINE_CELLS`.
     """
     points = _without_strays(p_WQs)
     found = find_planes(points, config=config, seed=seed)
@@ -131,10 +134,16 @@ def segment_recorded(
         extent[1] if height is None else height,
     )
     cell = least_cell = config.cell
+    most = MAX_FINE_CELLS if fine else MAX_CELLS
     if fit_cell:
         cell = fitting_cell(p_TQs[:2], least=cell)
-        most = _MOST_FINE_CELLS if fine else MAX_CELLS
         cell = max(cell, math.sqrt(size[0] * size[1] / most))
+    elif size[0] * size[1] > most * cell**2:
+        enough = math.ceil(1e4 * math.sqrt(size[0] * size[1] / most)) / 1e4
+        raise GridSizeError(
+            f"a tile of {size[0]:g} x {size[1]:g} m with cells of {cell:g} m has more "
+            f"than {most} cells; take a smaller tile or cells of {enough:g} m."
+        )
     # An extent from the data is a whole number of cells.
     tile = {
         "width": size[0] if width is not None else _whole(size[0], cell),

@@ -1,12 +1,14 @@
 """Beyond the paper: the mask by steps against the wall's own surface, with reasons."""
 
 import dataclasses
+import functools
 import math
 from typing import TypeVar
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, label
 from scipy.special import erf
+from threadpoolctl import ThreadpoolController
 
 from perception.config import SegmentationConfig
 from perception.errors import NoWallError
@@ -78,9 +80,12 @@ def refine_segmentation(
     near = np.abs(fine.depth) <= config.distance_threshold + config.cluster_tolerance
     near |= np.repeat(np.repeat(coarse.wall_mask, split, axis=0), split, axis=1)
     try:
-        surface = fit_wall_surface(
-            fine.depth, near, cell=cell / split, rng=np.random.default_rng(seed)
-        )
+        # The splines' matrices are handled in pieces too small to share out: where
+        # another process has a core, OpenBLAS's threads wait for each other at each.
+        with _threads().limit(limits=1, user_api="blas"):
+            surface = fit_wall_surface(
+                fine.depth, near, cell=cell / split, rng=np.random.default_rng(seed)
+            )
     except ValueError as error:
         raise NoWallError(f"the wall has no surface on the tile: {error}") from error
     steps = find_steps(fine, surface, cell=cell / split, config=config)
@@ -115,6 +120,12 @@ def refine_segmentation(
         reason=reason.astype(np.uint8),
         openings=tuple(opening.outline for opening in openings),
     )
+
+
+@functools.cache
+def _threads() -> ThreadpoolController:
+    """Returns what sets the threads of the libraries loaded."""
+    return ThreadpoolController()
 
 
 def _blocks(grid: Grid, split: int) -> Grid:

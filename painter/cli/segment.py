@@ -78,7 +78,7 @@ def segment(
         float | None,
         typer.Option(
             help="Edge of a grid cell, m.  [default: 0.01, or as the points' spacing "
-            "needs]"
+            "needs, or for at most 4 million cells, 400 000 by --fine]"
         ),
     ] = None,
     inlier_distance: Annotated[
@@ -100,8 +100,10 @@ def segment(
         typer.Option(
             "--fine",
             help="Draw the mask by fine steps against the wall's own surface, as the "
-            "robot does; for dense depth images. Adds surface, normals, confidence, "
-            "reasons and outlines of openings.",
+            "robot does: what rises 10 mm from it is no wall, and what bulges with it "
+            "is; for dense depth images. Adds surface, normals, confidence, reasons "
+            "and outlines of openings. Without it the mask is drawn by the paper's "
+            "steps: all within --inlier-distance of a plane.",
         ),
     ] = False,
     distance: Annotated[

@@ -91,6 +91,7 @@ def test_depth_image_is_taken(tmp_path):
         (["--tile", "2x-1"], "--tile must be > 0"),
         (["--tile", "0.001x1"], "smaller than a cell"),
         (["--tile", "900x900"], "more than 4e+06 cells"),
+        (["--cell", "0.001", "--fine"], "than 400000 cells; take a smaller tile or"),
         (["--cell", "0"], "--cell must be > 0"),
         (["--distance", "-1"], "--distance must be > 0"),
         (["--up", "w"], "--up must be x, -x, ... -z or X,Y,Z, got 'w'"),

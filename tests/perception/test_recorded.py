@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from perception.cloud_io import read_cloud
 from perception.config import SegmentationConfig
 from perception.depth_io import read_depth
-from perception.errors import NoWallError
+from perception.errors import GridSizeError, NoWallError
 from perception.planes import fit_plane
 from perception.recorded import segment_recorded
 from perception.synthetic import synthetic_wall
@@ -52,6 +52,27 @@ def test_tile_is_centred_upright_and_faces_the_sensor():
         steps.segmentation.X_WT.GetAsMatrix4(), X_WALL.GetAsMatrix4(), atol=0.01
     )
     assert steps.segmentation.wall_mask.mean() > 0.97
+
+
+@pytest.mark.parametrize(
+    ("fine", "cell"), [(True, (64.0 / 400_000) ** 0.5), (False, 0.01)]
+)
+def test_cells_grow_where_a_wall_is_too_large_for_them(fine, cell):
+    # Points 1 cm apart, so that 400 000 cells are too few for 64 m² and 4 million not.
+    x, y = np.meshgrid(np.arange(-4.0, 4.0, 0.01), np.arange(-4.0, 4.0, 0.01))
+    points = np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
+    found = segment(points, width=8.0, height=8.0, fit_cell=True, fine=fine)
+    assert found.segmentation.cell == pytest.approx(cell, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("fine", "cell", "most", "enough"),
+    [(True, 0.003, 400_000, 0.0032), (False, 0.0009, 4_000_000, 0.001)],
+)
+def test_a_grid_of_too_many_cells_is_refused(fine, cell, most, enough):
+    message = f"2 x 2 m with cells of {cell:g} m has more than {most} cells; "
+    with pytest.raises(GridSizeError, match=f"{message}.*of {enough:g} m"):
+        segment(wall(), config=SegmentationConfig(cell=cell), fine=fine)
 
 
 def test_without_a_direction_up_is_the_pictures():
