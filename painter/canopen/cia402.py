@@ -62,7 +62,6 @@ class Command(enum.IntEnum):
 
 # Controlword bits that the modes use.
 CONTROL_MODE_4 = 1 << 4  # PP: new set-point; HM: start; IP: enable interpolation.
-CONTROL_IMMEDIATELY = 1 << 5  # PP: change set immediately.
 CONTROL_HALT = 1 << 8
 
 # Transitions 2 to 14 and 16 by command, and 0, 1, 13 that the drive takes by itself.

@@ -1,5 +1,6 @@
 """What the commands share: options, results, progress and output folders."""
 
+import importlib.metadata
 import json
 import shutil
 import tempfile
@@ -15,6 +16,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from painter.errors import InputError
 from painter.planning.config import ZoneConfig
 
+ScenarioArgument = Annotated[
+    str | None,
+    typer.Argument(
+        help="Name of a scenario, or the path of its YAML file; default cubes, or that "
+        "of the run gone on with.",
+        show_default=False,
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -29,6 +38,16 @@ OutOption = Annotated[
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON alone on stdout.")
 ]
+
+
+def versions(*more: str) -> dict[str, str]:
+    """Returns the versions of the packages that a cycle's figures depend on.
+
+    Args:
+        more: Names of packages beside those that every cycle uses.
+    """
+    names = ("painter", "drake", *more, "numpy", "scipy", "open3d")
+    return {name: importlib.metadata.version(name) for name in names}
 
 
 def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:

@@ -1,7 +1,6 @@
 """`painter deploy`: the paint cycle on the robot, into a run folder."""
 
 import dataclasses
-import importlib.metadata
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +16,14 @@ from painter.canopen.bus_config import BusConfig
 from painter.canopen.bus_file import load_bus
 from painter.canopen.bus_process import BusProcess
 from painter.canopen.robot_clock import RobotClock
-from painter.cli.common import JsonOption, SetOption, print_result, progress
+from painter.cli.common import (
+    JsonOption,
+    ScenarioArgument,
+    SetOption,
+    print_result,
+    progress,
+    versions,
+)
 from painter.cli.run_log import event_watch, print_summary, write_log
 from painter.cli.step_by_step import StepByStep
 from painter.config import Scenario, dump_scenario, load_scenario
@@ -32,7 +38,6 @@ from painter.run.unfinished import rest_of_run
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 from perception.depth import CameraIntrinsics
 
-VERSIONS = ("painter", "drake", "python-can", "numpy", "scipy", "open3d")
 INTERRUPTED = "interrupted by the operator."
 BUS_LOG = "bus.log"
 # Age at which pictures of simulated drives are handed on, s: rendering takes less.
@@ -40,14 +45,7 @@ PICTURE_LATENCY = 0.3
 
 
 def deploy(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            help="Name of a scenario, or the path of its YAML file; default cubes, or "
-            "that of the run gone on with.",
-            show_default=False,
-        ),
-    ] = None,
+    scenario: ScenarioArgument = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Run folder to write.")
     ] = Path("runs/deploy"),
@@ -148,11 +146,14 @@ def deploy(
                 read_camera=reader.read,
                 gun_off=dry_run,
             )
-            versions = {word: importlib.metadata.version(word) for word in VERSIONS}
             folder.log(
-                0.0, "started", versions=versions, bus_time_s=process.now(),
-                dry_run=dry_run, speed=speed,
-            )  # fmt: skip
+                0.0,
+                "started",
+                versions=versions("python-can"),
+                bus_time_s=process.now(),
+                dry_run=dry_run,
+                speed=speed,
+            )
             show = stack.enter_context(progress(f"Deploying {job.name}"))
             tell = event_watch(folder, show)
             operator = StepByStep(

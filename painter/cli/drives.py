@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -65,7 +66,7 @@ def drives(
             help="With --scenario: socket on which `painter deploy --camera` finds the "
             "camera's pictures.",
         ),
-    ] = "/tmp/painter-camera",
+    ] = str(Path(tempfile.gettempdir()) / "painter-camera"),
     truth: Annotated[
         Path | None,
         typer.Option(

@@ -1,6 +1,5 @@
 """`painter simulate`: the whole paint cycle in Drake, into a run folder."""
 
-import importlib.metadata
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,7 +9,14 @@ import numpy as np
 import typer
 from pydrake.geometry import Meshcat
 
-from painter.cli.common import JsonOption, SetOption, print_result, progress
+from painter.cli.common import (
+    JsonOption,
+    ScenarioArgument,
+    SetOption,
+    print_result,
+    progress,
+    versions,
+)
 from painter.cli.earlier_run import EarlierRun
 from painter.cli.run_log import event_watch, print_summary, write_log
 from painter.config import dump_scenario, load_scenario
@@ -24,18 +30,10 @@ from painter.scene.load import load_scene
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 
 REPLAY_RATE = 10.0  # Pictures a second of robot time.
-VERSIONS = ("painter", "drake", "numpy", "scipy", "open3d")
 
 
 def simulate(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            help="Name of a scenario, or the path of its YAML file; default cubes, or "
-            "that of the run gone on with.",
-            show_default=False,
-        ),
-    ] = None,
+    scenario: ScenarioArgument = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Run folder to write.")
     ] = Path("runs/latest"),
@@ -112,8 +110,7 @@ def simulate(
     if viewer is not None:
         set_view(viewer)
         viewer.StartRecording(frames_per_second=REPLAY_RATE)
-    versions = {name: importlib.metadata.version(name) for name in VERSIONS}
-    folder.log(0.0, "started", versions=versions)
+    folder.log(0.0, "started", versions=versions())
     with progress(f"Simulating {job.name}") as show:
         log = SimulateCycle(
             job,

@@ -45,11 +45,6 @@ class MovingState(FrozenValue):
         """Makes a state of constant velocity."""
         return cls(np.array(x, dtype=float), np.array(v, dtype=float), np.zeros(len(x)))
 
-    @property
-    def resting(self) -> bool:
-        """Whether nothing moves."""
-        return not (self.v.any() or self.a.any())
-
 
 def plateaus(
     start: MovingState, end: MovingState, durations: FloatArray

@@ -50,30 +50,6 @@ def order_strokes(
     )
 
 
-def in_order(strokes: Sequence[Stroke]) -> tuple[Stroke, ...]:
-    """Orders strokes along T y line by line from the left, up and down in turn.
-
-    A first order, from which `order_strokes` goes on.
-
-    Args:
-        strokes: Along T y, in any order and direction.
-    """
-    lines: dict[int, list[Stroke]] = {}
-    for stroke in sorted(strokes, key=lambda stroke: stroke.column):
-        lines.setdefault(stroke.column, []).append(stroke)
-    done: list[Stroke] = []
-    upwards = True
-    for line in lines.values():
-        upright = [
-            stroke if stroke.end_T[1] > stroke.start_T[1] else reversed_stroke(stroke)
-            for stroke in line
-        ]
-        upright.sort(key=lambda stroke: float(stroke.start_T[1]))
-        done += upright if upwards else map(reversed_stroke, reversed(upright))
-        upwards = not upwards
-    return tuple(done)
-
-
 def link_time(
     strokes: Sequence[Stroke], p_TG_start: FloatArray, p_TG_end: FloatArray
 ) -> float:

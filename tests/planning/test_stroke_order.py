@@ -7,7 +7,6 @@ import pytest
 
 from painter.planning.spray_path import Stroke
 from painter.planning.stroke_order import (
-    in_order,
     link_time,
     order_strokes,
     reversed_stroke,
@@ -37,6 +36,12 @@ def scattered(seed, count):
     ]
 
 
+def line_by_line(strokes):
+    """Strokes by column, up and down in turn; all of `strokes` go up."""
+    by_column = sorted(strokes, key=lambda s: s.column)
+    return [reversed_stroke(s) if k % 2 else s for k, s in enumerate(by_column)]
+
+
 def spans(strokes):
     """Strokes without their direction and order."""
     return sorted(
@@ -63,7 +68,7 @@ def test_few_strokes_come_close_to_the_best_of_all_orders(seed):
 
 
 def test_order_is_never_worse_than_the_given_one():
-    strokes = in_order(scattered(9, 30))
+    strokes = line_by_line(scattered(9, 30))
     dut = order_strokes(strokes, HOME, HOME)
     assert spans(dut) == spans(strokes)
     assert link_time(dut, HOME, HOME) <= link_time(strokes, HOME, HOME)
@@ -92,7 +97,9 @@ def test_strokes_that_go_on_stay_together():
 
 
 def test_lines_go_up_and_down_in_turn():
-    dut = in_order([stroke(0.2, 0.0, 1.0, 0), stroke(0.4, 0.0, 1.0, 1)])
+    rests = np.array([0.2, 0.0, 0.3]), np.array([0.4, 0.0, 0.3])
+    lines = [stroke(0.2, 0.0, 1.0, 0), stroke(0.4, 0.0, 1.0, 1)]
+    dut = order_strokes(lines, *rests)
     assert [float(np.sign((s.end_T - s.start_T)[1])) for s in dut] == [1.0, -1.0]
 
 
