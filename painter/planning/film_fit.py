@@ -1,10 +1,11 @@
 """Strokes fitted to the film they are to leave.
 
 Fitting varies one number of one stroke at a time (its place across, ends, flow and
-stand-off) and keeps what lowers the film's cost. Only the cells in the fan's reach are
-looked at, so a tile's strokes take about a second.
+stand-off) and keeps what lowers the film's cost. Only the cells whose film changes are
+looked at, and what failed once is tried again only where the film has changed since.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.ndimage import maximum_filter
 from painter.planning.config import RasterConfig
 from painter.planning.film_cost import FilmCost, stroke_cost
 from painter.planning.film_model import FilmModel, Line
-from perception.values import BoolArray, FloatArray
+from perception.values import BoolArray, FloatArray, IntArray
 
 # Steps across, along (m), of flow (share) and stand-off (m): coarse, then fine.
 _STEPS = ((0.01, 0.01, 0.10, 0.03), (0.004, 0.005, 0.04, 0.0))
@@ -49,6 +50,29 @@ class Span(NamedTuple):
         return self.x + self.lean * y
 
 
+class _Window(NamedTuple):
+    """Rows and columns of the site."""
+
+    rows: slice
+    columns: slice
+
+
+_Step = tuple[str, float]  # A number of a span, and by how much it varies.
+
+
+class _Laid:
+    """A span with the film that it leaves, and the steps of it that did not help."""
+
+    def __init__(self, span: Span, window: _Window, film: FloatArray) -> None:
+        """Takes a span and its film on the cells that it reaches."""
+        self.span, self.window, self.film = span, window, film
+        # At which change of the film steps were last tried, and on which cells; None:
+        # they cannot be made.
+        self.failed: dict[_Step, tuple[int, _Window] | None] = {}
+        # At which change of the film it was last found to be worth its time.
+        self.kept: int | None = None
+
+
 class FilmFit:
     """Spans on a site and the film they leave; spans are added, then fitted."""
 
@@ -69,14 +93,24 @@ class FilmFit:
             film: (ny, nx) of the site, what is there already; None = nothing.
         """
         site = model.site
-        self.spans: list[Span] = []
         self.film: FloatArray = np.zeros(site.wanted.shape)
         if film is not None:
             self.film += film
+        self._laid: list[_Laid] = []
         self._model, self._cost, self._raster = model, cost, raster
         size = 2 * round(_GUN_REACH / site.cell) + 1
         self._tops = maximum_filter(site.height, size=size) + _GUN_FRONT
         self._tops[self._tops <= _GUN_FRONT] = 0.0  # The wall has its own clearance.
+        # While spans are fitted: what each cell costs, and at which change of the film
+        # it last changed.
+        self._costs: FloatArray = np.zeros(site.wanted.shape)
+        self._changed: IntArray = np.zeros(site.wanted.shape, dtype=np.int64)
+        self._changes = 0
+
+    @property
+    def spans(self) -> tuple[Span, ...]:
+        """The spans as they are now."""
+        return tuple(laid.span for laid in self._laid)
 
     def room(self, x: FloatArray, standoff: float, lean: float = 0.0) -> BoolArray:
         """Returns the rows on which the gun clears what stands out.
@@ -99,17 +133,19 @@ class FilmFit:
 
     def add(self, span: Span) -> None:
         """Adds a span and its film."""
-        self.spans.append(span)
-        rows, columns, film = self._patch(span)
-        self.film[rows, columns] += film
+        laid = self._lay(span)
+        self._laid.append(laid)
+        self.film[laid.window] += laid.film
 
     def fit(self) -> None:
         """Varies the spans until nothing helps; drops those that are worth nothing."""
+        site = self._model.site
+        self._costs = self._cost(self.film, site.wanted, site.clean)
         for across, along, flow, standoff in _STEPS:
             for _ in range(_PASSES):
                 changes = sum(
                     self._fit_span(index, across, along, flow, standoff)
-                    for index in range(len(self.spans))
+                    for index in range(len(self._laid))
                 )
                 changes += self._drop()
                 if changes < 3:
@@ -119,24 +155,22 @@ class FilmFit:
         self, index: int, across: float, along: float, flow: float, standoff: float
     ) -> int:
         """Tries steps of one span; returns how many helped."""
-        helped = 0
-        span = self.spans[index]
+        span = self._laid[index].span
         steps = [("x", across), ("low", along), ("high", along)]
         if span.standoff < self._raster.standoff:
             if span.high - span.low > _SHORTEST_LEANING:
                 steps.append(("lean", 2.0 * across / (span.high - span.low)))
             if standoff:
                 steps.append(("standoff", standoff))
-        steps.append(("flow", flow * span.standoff))
+        steps.append(("flow", flow * span.standoff / self._raster.standoff))
+        helped = 0
         for name, step in steps:
             for signed in (step, -step):
-                if name == "flow":
-                    signed /= self._raster.standoff
-                for _ in range(_REPEATS):
-                    trial = self._varied(self.spans[index], name, signed)
-                    if trial is None or not self._try(index, trial):
-                        break
+                before = helped
+                while helped - before < _REPEATS and self._try(index, (name, signed)):
                     helped += 1
+                if helped > before:
+                    break  # The step back would only undo the last one.
         return helped
 
     def _varied(self, span: Span, name: str, step: float) -> Span | None:
@@ -163,85 +197,146 @@ class FilmFit:
     def _has_room(self, span: Span) -> bool:
         site = self._model.site
         nx = site.wanted.shape[1]
-        rows = np.arange(*(self._row(y) for y in span[1:3]))
+        rows = slice(site.row(span.low), site.row(span.high))
+        if rows.start >= rows.stop:
+            return False
+        if span.lean == 0.0:
+            column = math.floor(span.x / site.cell) + site.border
+            if not 0 <= column < nx:
+                return False
+            return bool(self._tops[rows, column].max() <= span.standoff)
         places = span.x + span.lean * site.y[rows]
         columns = np.floor(places / site.cell).astype(int) + site.border
-        if columns.size == 0 or columns.min() < 0 or columns.max() >= nx:
+        if columns.min() < 0 or columns.max() >= nx:
             return False
-        return bool((self._tops[rows, columns] <= span.standoff).all())
+        tops = self._tops[np.arange(rows.start, rows.stop), columns]
+        return bool(tops.max() <= span.standoff)
 
-    def _try(self, index: int, trial: Span) -> bool:
-        """Takes the trial for the span if it costs less."""
-        span = self.spans[index]
-        old, new = self._rows(span), self._rows(trial)
-        first, end = min(old.start, new.start), max(old.stop, new.stop)
-        if trial.x == span.x and trial.flow == span.flow and trial.lean == span.lean:
-            # Only one end has moved: the film beyond its blur is as it was.
-            line = self._line(span)
-            ends = (trial.low, span.low) if trial.low != span.low else ()
-            ends = ends or (trial.high, span.high)
-            first = max(first, self._row(min(ends) - line.blur))
-            end = min(end, self._row(max(ends) + line.blur) + 1)
-        rows = slice(first, end)
-        (_, left, without), (_, right, with_) = (
-            self._patch(span, rows),
-            self._patch(trial, rows),
-        )
-        columns = slice(min(left.start, right.start), max(left.stop, right.stop))
-        before = self.film[rows, columns]
-        after = before.copy()
-        after[:, left.start - columns.start : left.stop - columns.start] -= without
-        after[:, right.start - columns.start : right.stop - columns.start] += with_
-        gain = self._area_cost(before, rows, columns) - self._area_cost(
-            after, rows, columns
-        )
+    def _try(self, index: int, step: _Step) -> bool:
+        """Takes a step of a span if that costs less."""
+        laid = self._laid[index]
+        if step in laid.failed:
+            last = laid.failed[step]
+            if last is None or self._unchanged_since(*last):
+                return False
+        span, trial = laid.span, self._varied(laid.span, *step)
+        if trial is None:
+            laid.failed[step] = None
+            return False
+        line, reached = self._reached(trial)
+        changed = _hull(laid.window, reached)
+        name, size = step
+        if name in ("low", "high"):
+            # The film beyond the blur of the end that moves is as it was.
+            low, high = sorted((getattr(span, name), getattr(trial, name)))
+            rows = self._model.rows(low, high, span.standoff)
+            changed = _cut(changed, rows)
+        reached = _cut(reached, changed.rows)
+        film = self.film[changed].copy()
+        part = _part(film, changed, laid.window)
+        part -= _part(laid.film, laid.window, changed)
+        part = _part(film, changed, reached)
+        part += self._film(trial, line, reached)
+        costs = self._cell_costs(film, changed)
+        gain = float((self._costs[changed] - costs).sum()) * self._model.site.cell**2
         gain += stroke_cost(span.high - span.low) - stroke_cost(trial.high - trial.low)
         if gain < _GAIN:
+            laid.failed[step] = (self._changes, changed)
             return False
-        self.film[rows, columns] = after
-        self.spans[index] = trial
+        self._change(changed, film, costs)
+        laid = self._laid[index] = self._lay(trial)
+        # The step back would only undo this one.
+        laid.failed[name, -size] = (self._changes, changed)
         return True
 
     def _drop(self) -> int:
         """Drops spans without which the film costs no more; returns how many."""
-        kept: list[Span] = []
-        for span in self.spans:
-            rows, columns, film = self._patch(span)
-            before = self.film[rows, columns]
-            loss = self._area_cost(before - film, rows, columns) - self._area_cost(
-                before, rows, columns
-            )
-            if loss < stroke_cost(span.high - span.low):
-                self.film[rows, columns] = before - film
-            else:
-                kept.append(span)
-        dropped = len(self.spans) - len(kept)
-        self.spans = kept
+        kept: list[_Laid] = []
+        for laid in self._laid:
+            if laid.kept is None or not self._unchanged_since(laid.kept, laid.window):
+                film = self.film[laid.window] - laid.film
+                costs = self._cell_costs(film, laid.window)
+                loss = float((costs - self._costs[laid.window]).sum())
+                length = laid.span.high - laid.span.low
+                if loss * self._model.site.cell**2 < stroke_cost(length):
+                    self._change(laid.window, film, costs)
+                    continue
+            laid.kept = self._changes
+            kept.append(laid)
+        dropped = len(self._laid) - len(kept)
+        self._laid = kept
         return dropped
 
-    def _area_cost(self, film: FloatArray, rows: slice, columns: slice) -> float:
+    def _change(self, window: _Window, film: FloatArray, costs: FloatArray) -> None:
+        """Takes over a film and its costs on a window."""
+        self.film[window], self._costs[window] = film, costs
+        self._changes += 1
+        self._changed[window] = self._changes
+
+    def _unchanged_since(self, change: int, window: _Window) -> bool:
+        return bool(self._changed[window].max() <= change)
+
+    def _cell_costs(self, film: FloatArray, window: _Window) -> FloatArray:
         site = self._model.site
-        cost = self._cost(film, site.wanted[rows, columns], site.clean[rows, columns])
-        return float(cost.sum()) * site.cell**2
+        return self._cost(film, site.wanted[window], site.clean[window])
 
-    def _line(self, span: Span) -> Line:
-        return self._model.line(span.x, span.standoff, span.lean)
+    def _lay(self, span: Span) -> _Laid:
+        line, window = self._reached(span)
+        return _Laid(span, window, self._film(span, line, window))
 
-    def _row(self, y: float) -> int:
-        site = self._model.site
-        row = int(np.floor(y / site.cell)) + site.border
-        return int(min(max(row, 0), site.wanted.shape[0]))
+    def _reached(self, span: Span) -> tuple[Line, _Window]:
+        """Returns a span's line and the cells that its film reaches."""
+        rows = self._model.rows(span.low, span.high, span.standoff)
+        line = self._model.line(span.x, span.standoff, span.lean, rows)
+        return line, _Window(rows, slice(*line.columns))
 
-    def _rows(self, span: Span) -> slice:
-        blur = self._line(span).blur
-        return slice(self._row(span.low - blur), self._row(span.high + blur) + 1)
+    def _film(self, span: Span, line: Line, window: _Window) -> FloatArray:
+        """Returns a span's film on rows of its window."""
+        first, stop = window.rows.start, window.rows.stop
+        film = np.asarray(span.flow * line.film[window.rows])
+        begun = self._model.rows(span.low, span.low, span.standoff)
+        ended = self._model.rows(span.high, span.high, span.standoff)
+        if begun.stop > ended.start:
+            share = self._model.below(line, window.rows, span.low)
+            share -= self._model.below(line, window.rows, span.high)
+            film *= share
+            return film
+        # In between all of the fan passes over each cell.
+        if first < begun.stop:
+            rows = slice(first, min(begun.stop, stop))
+            film[: rows.stop - first] *= self._model.below(line, rows, span.low)
+        if ended.start < stop:
+            rows = slice(max(first, ended.start), stop)
+            share = self._model.below(line, rows, span.high)
+            film[rows.start - first :] *= 1.0 - share
+        return film
 
-    def _patch(
-        self, span: Span, rows: slice | None = None
-    ) -> tuple[slice, slice, FloatArray]:
-        """Returns a span's film on the rows and columns that it reaches."""
-        rows = rows or self._rows(span)
-        line = self._line(span)
-        passed = self._model.passed(line, rows, span.low, span.high)
-        film = span.flow * line.film[rows] * passed
-        return rows, slice(*line.columns), film
+
+def _hull(a: _Window, b: _Window) -> _Window:
+    """Returns the least window that holds both."""
+    (rows, columns), (other_rows, other_columns) = a, b
+    return _Window(
+        slice(min(rows.start, other_rows.start), max(rows.stop, other_rows.stop)),
+        slice(
+            min(columns.start, other_columns.start),
+            max(columns.stop, other_columns.stop),
+        ),
+    )
+
+
+def _cut(window: _Window, rows: slice) -> _Window:
+    """Returns what of a window lies in some rows; it may be empty."""
+    start = max(window.rows.start, rows.start)
+    return window._replace(
+        rows=slice(start, max(min(window.rows.stop, rows.stop), start))
+    )
+
+
+def _part(film: FloatArray, window: _Window, other: _Window) -> FloatArray:
+    """Returns what of a film on one window lies in another, too."""
+    (rows, columns), (other_rows, other_columns) = window, other
+    return film[
+        max(other_rows.start - rows.start, 0) : max(other_rows.stop - rows.start, 0),
+        max(other_columns.start - columns.start, 0) : other_columns.stop
+        - columns.start,
+    ]

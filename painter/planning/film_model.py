@@ -8,6 +8,7 @@ of the nominal film.
 """
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 # Beyond the tile's edges by so much the film is looked at, m: more than half a fan.
 MARGIN = 0.14
 _TABLE = np.linspace(-1.0, 1.0, 2001)
+_BLOCK = 16  # Rows of a leaning line that are made together.
 
 
 def margin_cells(cell: float) -> int:
@@ -70,6 +72,23 @@ class Site(FrozenValue):
         )
 
     @functools.cached_property
+    def deepest(self) -> float:
+        """The lowest height, or the wall's own, 0, m."""
+        return min(float(self.height.min()), 0.0)
+
+    @functools.cached_property
+    def steps(self) -> BoolArray:
+        """(ny, nx) bool, where the height is another than on the row below."""
+        steps = np.ones(self.height.shape, dtype=bool)
+        steps[1:] = self.height[1:] != self.height[:-1]
+        return steps
+
+    def row(self, y: float) -> int:
+        """Returns the row at `y`, m in T, or the end that it is beyond."""
+        row = math.floor(y / self.cell) + self.border
+        return min(max(row, 0), len(self.height))
+
+    @functools.cached_property
     def x(self) -> FloatArray:
         """(nx,) m, centres of the columns in T."""
         return np.asarray(
@@ -90,18 +109,14 @@ class Line(FrozenValue):
 
     Attributes:
         columns: First and end column of the window.
-        film: (ny, n) film of an endless stroke with full flow.
+        film: (ny, n) film of an endless stroke with full flow; on rows that were not
+            asked for it may lack.
         thickness: (ny, n) m, half the fan's thickness as it passes over each cell.
     """
 
     columns: tuple[int, int]
     film: FloatArray
     thickness: FloatArray
-
-    @functools.cached_property
-    def blur(self) -> float:
-        """How far from a stroke's end its film is not yet or still whole, m."""
-        return float(self.thickness.max())
 
 
 class FilmModel:
@@ -124,72 +139,103 @@ class FilmModel:
         self._speed = speed
         self._cdf = betainc(tip.gamma + 1.0, tip.gamma + 1.0, 0.5 + 0.5 * _TABLE)
         self._across = betainc(tip.beta2, tip.beta2, 0.5 + 0.5 * _TABLE)
-        self._lines: dict[tuple[float, float, float], Line] = {}
+        self._lines: dict[tuple[float, float, float, int, int], Line] = {}
 
-    def line(self, x_line: float, standoff: float, lean: float = 0.0) -> Line:
+    def rows(self, low: float, high: float, standoff: float) -> slice:
+        """Returns the rows that a stroke's film reaches.
+
+        Args:
+            low: Where it begins or ends, m in T y.
+            high: Where it ends or begins, m in T y.
+            standoff: From which it is sprayed, m.
+        """
+        _, b = half_axes(self._tip, standoff)
+        return slice(self.site.row(low - b), self.site.row(high + b) + 1)
+
+    def line(
+        self,
+        x_line: float,
+        standoff: float,
+        lean: float = 0.0,
+        rows: slice | None = None,
+    ) -> Line:
         """Returns a line.
 
         Args:
             x_line: Where it meets T y = 0, m in T.
             standoff: From which it is sprayed, m.
             lean: By how much it goes to the right in going up, m/m.
+            rows: Those of the site that are looked at; None = all.
         """
-        key = (round(x_line, 4), round(standoff, 4), round(lean, 4))
+        first, stop = 0, len(self.site.y)
+        if rows is not None and lean != 0.0:
+            # Each row of it is another; upright most are alike, and all soon made.
+            first = rows.start // _BLOCK * _BLOCK
+            stop = min(-(-rows.stop // _BLOCK) * _BLOCK, stop)
+        key = (round(x_line, 4), round(standoff, 4), round(lean, 4), first, stop)
         if key not in self._lines:
             self._lines[key] = self._make_line(*key)
         return self._lines[key]
 
-    def passed(self, line: Line, rows: slice, low: float, high: float) -> FloatArray:
-        """Returns the share of a line's film that a stroke of it leaves.
+    def below(self, line: Line, rows: slice, end: float) -> FloatArray:
+        """Returns the share of the fan that lies below each cell.
+
+        A stroke leaves the share of a line's film that lies below with the fan at its
+        lower end, and no longer with the fan at its upper one.
 
         Args:
             line: The line.
             rows: Those of the site that are looked at, k of them.
-            low: Where the stroke begins or ends, m in T y.
-            high: Where it ends or begins, m in T y.
+            end: Where on the line the spray axis is, m in T y.
 
         Returns:
-            (k, n): the share of the fan's thickness that has passed over each cell.
+            (k, n) 0 to 1, by flow.
         """
-        y, thickness = self.site.y[rows][:, None], line.thickness[rows]
-        below, above = (
-            np.interp((y - end) / thickness, _TABLE, self._across)
-            for end in (low, high)
+        offset = self.site.y[rows, None] - end
+        return np.asarray(
+            np.interp(offset / line.thickness[rows], _TABLE, self._across)
         )
-        return np.asarray(below - above)
 
     def film(self, strokes: Sequence[Stroke]) -> FloatArray:
         """Returns the film of strokes on the site, (ny, nx), as share of nominal."""
         film = np.zeros(self.site.wanted.shape)
-        every = slice(0, self.site.y.size)
         for stroke in strokes:
             x, y = (float(value) for value in stroke.start_T)
             x_end, y_end = (float(value) for value in stroke.end_T)
             lean = (x_end - x) / (y_end - y)
-            line = self.line(x - lean * y, stroke.standoff, lean)
-            share = self.passed(line, every, min(y, y_end), max(y, y_end))
+            low, high = min(y, y_end), max(y, y_end)
+            rows = self.rows(low, high, stroke.standoff)
+            line = self.line(x - lean * y, stroke.standoff, lean, rows)
+            share = self.below(line, rows, low) - self.below(line, rows, high)
             scale = stroke.flow * self._speed / stroke.speed
-            film[:, slice(*line.columns)] += scale * line.film * share
+            film[rows, slice(*line.columns)] += scale * line.film[rows] * share
         return film
 
-    def _make_line(self, x_line: float, standoff: float, lean: float) -> Line:
+    def _make_line(
+        self, x_line: float, standoff: float, lean: float, low: int, high: int
+    ) -> Line:
+        """Makes a line on the rows from `low` up to `high`."""
         site, cell = self.site, self.site.cell
         a, b = half_axes(self._tip, standoff)
         ny, count = site.wanted.shape
-        axis = x_line + lean * site.y
-        middle = np.floor(axis / cell).astype(int) + site.border
         # What lies back is reached by rays that went past the fan's width on the wall.
-        spread = 1.0 - min(float(site.height.min()), 0.0) / standoff
-        reach = int(np.ceil(spread * a / cell)) + 1
+        reach = int(np.ceil((1.0 - site.deepest / standoff) * a / cell)) + 1
         # Rows that are as the one below them are looked at once.
-        columns = middle[:, None] + np.arange(-reach, reach + 1)
-        height = site.height[np.arange(ny)[:, None], np.clip(columns, 0, count - 1)]
-        parts = np.column_stack([height, axis])
-        new = np.append(True, (parts[1:] != parts[:-1]).any(axis=1))
-        back = np.cumsum(new) - 1
-        drop = np.maximum(standoff - height[new], 1e-6)
-        first_edge = (columns[new, :1] - site.border) * cell - axis[new, None]
-        edges = first_edge + cell * np.arange(2 * reach + 2)
+        rows, back = np.arange(low, high), np.arange(high - low)
+        if lean == 0.0:
+            column = math.floor(x_line / cell) + site.border
+            first = min(max(column - reach, 0), count - 1)
+            new = site.steps[:, first : max(column + reach, 0) + 1].any(axis=1)
+            rows, back = np.flatnonzero(new), np.cumsum(new) - 1
+        axis = (x_line + lean * site.y[rows])[:, None]
+        middle = np.floor(axis / cell).astype(int) + site.border
+        columns = middle + np.arange(-reach, reach + 1)
+        height = site.height[
+            rows[:, None], np.minimum(np.maximum(columns, 0), count - 1)
+        ]
+        drop = np.maximum(standoff - height, 1e-6)
+        edges = (columns[:, :1] - site.border) * cell - axis
+        edges = edges + cell * np.arange(2 * reach + 2)
         # The steepest ray that has landed by each column's far edge, on either side of
         # the axis; a column higher than the nozzle stops them all.
         right = self._landed(edges[:, reach + 1 :], drop[:, reach:], standoff / a)
@@ -200,15 +246,17 @@ class FilmModel:
         # Leaning, a metre of the stroke is less than a metre up.
         share *= np.hypot(1.0, lean) * self._dose / cell
 
-        first = int(np.clip(middle.min() - reach, 0, count - 1))
-        end = int(np.clip(middle.max() + reach + 1, first + 1, count))
-        film = np.zeros((ny, end - first))
+        first = min(max(int(middle.min()) - reach, 0), count - 1)
+        end = min(max(int(middle.max()) + reach, first) + 1, count)
+        landed = np.zeros((rows.size, end - first))
         inside = (columns >= first) & (columns < end)
         row, _ = np.nonzero(inside)
-        film[row, columns[inside] - first] = share[back][inside]
-        offset = (site.x[first:end] - axis[:, None]) / a
-        thin = b * np.sqrt(np.clip(1.0 - offset**2, 1e-4, None))
-        return Line((first, end), film, thin)
+        landed[row, columns[inside] - first] = share[inside]
+        offset = (site.x[first:end] - axis) / a
+        thin = b * np.sqrt(np.maximum(1.0 - offset**2, 1e-4))
+        film, thickness = np.zeros((ny, end - first)), np.full((ny, end - first), b)
+        film[low:high], thickness[low:high] = landed[back], thin[back]
+        return Line((first, end), film, thickness)
 
     def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:
         """Returns the flow's share on each column outwards from the spray axis.

@@ -9,7 +9,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.cut_in import _switch
 from painter.planning.deposition import half_axes, mean_film, predicted_film
-from painter.planning.film_cost import FilmCost
+from painter.planning.film_cost import FilmCost, stroke_cost
+from painter.planning.film_fit import FilmFit, Span
 from painter.planning.film_model import FilmModel, Site
 from painter.planning.raster import plan_strokes, raster_film
 from painter.planning.spray_cone import SprayCone, SpraySurface
@@ -143,6 +144,66 @@ def test_a_leaning_stick_is_cut_in_along_its_sides():
     assert bare.sum() * CELL**2 / (2 * 0.8) <= 0.04
     # Of four cells across the stick about one is soiled.
     assert figures(~stick, strokes, height)["keepout"] <= 0.30
+
+
+class PlainFit(FilmFit):
+    """Weighs the whole site anew for every step, whether it was tried before or not."""
+
+    def worth(self, spans):
+        site = self._model.site
+        strokes = [
+            stroke(span.x_at(span.low), span.low, span.high).replace(
+                end_T=np.array([span.x_at(span.high), span.high]),
+                standoff=span.standoff,
+                flow=span.flow,
+            )
+            for span in spans
+        ]
+        film = self._model.film(strokes)
+        cost = self._cost(film, site.wanted, site.clean).sum() * site.cell**2
+        return cost + sum(stroke_cost(span.high - span.low) for span in spans)
+
+    def _try(self, index, step):
+        spans = list(self.spans)
+        trial = self._varied(spans[index], *step)
+        if trial is None:
+            return False
+        varied = [*spans[:index], trial, *spans[index + 1 :]]
+        if self.worth(spans) - self.worth(varied) < 1e-6:
+            return False
+        self._laid[index] = self._lay(trial)
+        return True
+
+    def _drop(self):
+        before = len(self._laid)
+        for laid in list(self._laid):
+            rest = [other for other in self._laid if other is not laid]
+            if self.worth([other.span for other in rest]) < self.worth(self.spans):
+                self._laid = rest
+        return before - len(self._laid)
+
+
+def test_strokes_are_fitted_as_if_the_whole_site_were_weighed_each_time():
+    mask = np.ones((70, 70), dtype=bool)
+    mask[25:45, 30:42] = False
+    site = Site.of_tile(mask, CELL, np.where(mask, 0.0, 0.04))
+    spans = [
+        *(Span(x, 0.0, 0.7, RASTER.standoff, 1.0) for x in (0.05, 0.2)),
+        *(Span(x, 0.12, 0.55, 0.15, 0.4, lean) for x, lean in ((0.2, 0.1), (0.5, 0.0))),
+        *(Span(0.36, low, high, 0.2, 0.6) for low, high in ((0.0, 0.2), (0.5, 0.7))),
+        Span(0.62, 0.0, 0.7, RASTER.standoff, 0.9),
+        Span(0.36, 0.33, 0.37, 0.12, 0.1),  # On what stays clean: it is dropped.
+    ]
+    fitted = []
+    for kind in (FilmFit, PlainFit):
+        film = FilmModel(site, tip=TIP, speed=RASTER.speed, nominal=NOMINAL)
+        dut = kind(film, FilmCost.fine(site), raster=RASTER)
+        for span in spans:
+            dut.add(span)
+        dut.fit()
+        fitted.append(dut.spans)
+    assert len(fitted[0]) < len(spans)
+    np.testing.assert_allclose(fitted[0], fitted[1], rtol=0.0, atol=1e-12)
 
 
 def test_switching_is_paid_for_once_a_run():
