@@ -19,7 +19,7 @@ _RUN_OUT = ((0.10, 0.03), (0.05, 0.01))
 _SLOWER = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)  # Shares of a stroke's speed, in turn.
 _TOO_BENT = "the wall's surface bends too sharply for the joints at this speed"
 # Share of the strokes' length; if more is out of reach the arm stands in the wrong
-# place.
+# place. A touch-up also finds what the job itself could not reach: it mends the rest.
 _MOST_OUT_OF_REACH = 0.05
 
 
@@ -39,7 +39,8 @@ def clear_strokes(
         What stays, and what does not with the reason.
 
     Raises:
-        ReachError: More than a twentieth of their length is out of the arm's reach.
+        ReachError: More than a twentieth of their length is out of the arm's reach, or
+            of touch-ups all.
     """
     if not strokes:
         return [], []
@@ -60,9 +61,10 @@ def clear_strokes(
     q = linker.gun.solve(p_TGs)
     reached = linker.limits.contains(q)
     total = sum(stroke.length for stroke in strokes)
-    if np.count_nonzero(~reached) * _STEP > _MOST_OUT_OF_REACH * total:
-        outside = p_TGs[~reached]
-        require_reach(outside, gun=linker.gun, limits=linker.limits, what="strokes")
+    first_time = np.repeat([stroke.kind != "touch_up" for stroke in strokes], counts)
+    lost = np.count_nonzero(first_time & ~reached) * _STEP
+    if lost > _MOST_OUT_OF_REACH * total or not reached.any():
+        require_reach(p_TGs, gun=linker.gun, limits=linker.limits, what="strokes")
     free = np.array(reached)
     free[reached] = linker.space.free(q[reached])
     turns = np.ones(len(q), dtype=bool)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from painter.errors import ReachError
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.deposition import best_pitch, mean_film, predicted_film
 from painter.planning.film_model import Site
@@ -124,6 +125,25 @@ def test_touch_up_is_a_program_that_the_arm_can_do(robot, make_wall):
     assert len(dut.strokes) == len(strokes)
     assert dut.skipped == ()
     assert sorted(dut.motion.flow) == sorted(stroke.flow for stroke in strokes)
+
+
+def test_a_touch_up_mends_what_is_in_reach_and_reports_the_rest(robot, make_wall):
+    """A stroke 2.5 m up is out of reach, whatever else there is to mend."""
+    near, far = (
+        Stroke(np.array([1.0, low]), np.array([1.0, low + 0.2]), 0.6, "touch_up", 0)
+        for low in (1.0, 2.5)
+    )
+    home = np.deg2rad(MotionConfig().home_deg)
+    planner = robot.planner(tip=TIP, raster=RASTER)
+    dut = planner.program([near, far], make_wall(), home)
+    assert len(dut.strokes) == 1
+    assert sum(item.stroke.length for item in dut.skipped) == pytest.approx(far.length)
+    with pytest.raises(ReachError, match="strokes: 100 % of it is out of reach"):
+        planner.program([far], make_wall(), home)
+    # A job of these strokes stands in the wrong place: half of it cannot be done.
+    job = [stroke.replace(kind="body") for stroke in (near, far)]
+    with pytest.raises(ReachError, match="strokes: 50 % of it is out of reach"):
+        planner.program(job, make_wall(), home)
 
 
 @pytest.mark.parametrize("stopped_at", [1.7, 6.25, 15.9])
