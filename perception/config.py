@@ -36,6 +36,8 @@ class MapConfig:
         min_range: Nearest depth used, m.
         max_range: Farthest depth used, m.
         edge_jump: Pixels next to a jump larger than this share of depth are dropped.
+        edge_step: And next to one larger than this times the square of depth, 1/m;
+            errors of stereo grow so, and 0.014 is 0.3 px of a D435's disparity.
         edge_window: Window within which they are, on the near side of the jump, px;
             as large as the block matcher's, which makes near surfaces grow by half.
         stride: Every so many-th pixel and row is used.
@@ -51,6 +53,7 @@ class MapConfig:
     min_range: float = 0.25
     max_range: float = 3.0
     edge_jump: float = 0.02
+    edge_step: float = 0.014
     edge_window: int = 7
     stride: int = 2
     min_count: int = 3

@@ -55,13 +55,15 @@ def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolAr
 
     A block matcher makes the near side of a depth edge grow by half its window, and
     puts flying pixels between the two sides. So near pixels within half of
-    `config.edge_window` of a farther one are dropped, and far pixels next to a nearer
-    one. Pixels without depth count as what lies to their left: the shadow that hides
-    them from the right imager begins at the far side, which is on the left.
+    `config.edge_window` of farther ones are dropped, and far pixels next to a nearer
+    one. A farther one that stands alone is a flying pixel itself, and no edge. Pixels
+    without depth count as what lies to their left: the shadow that hides them from the
+    right imager begins at the far side, which is on the left.
 
     Args:
         depth_mm: (H, W) uint16, mm, 0 = no return.
-        config: `min_range`, `max_range`, `edge_jump` and `edge_window` are used.
+        config: `min_range`, `max_range`, `edge_jump`, `edge_step` and `edge_window` are
+            used.
 
     Returns:
         (H, W) bool.
@@ -70,8 +72,12 @@ def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolAr
     column = np.where(seen, np.arange(depth_mm.shape[1], dtype=np.int32), 0)
     column = np.maximum.accumulate(column, axis=1)
     depth = np.take_along_axis(depth_mm, column, axis=1).astype(np.float32)
-    jump = np.float32(config.edge_jump) * depth
-    usable = seen & (moving_max(depth, config.edge_window) - depth <= jump)
+    # `edge_step` is in 1/m, depth in mm.
+    step = np.float32(config.edge_step / 1000)
+    jump = np.minimum(np.float32(config.edge_jump) * depth, step * depth**2)
+    # What is left of far areas has lost a pixel along its edges, and gets it back.
+    far = moving_max(moving_min(depth, 3), config.edge_window + 2)
+    usable = seen & (far - depth <= jump)
     usable &= depth - moving_min(depth, 3) <= jump
     usable &= (depth >= 1000 * config.min_range) & (depth <= 1000 * config.max_range)
     return usable

@@ -17,7 +17,7 @@ from perception.values import BoolArray, FloatArray, IntArray
 _KNOTS = (0.25, 0.125)
 """Distance of knots, m. Waves from about three times that length are followed, and a
 plate of 0.2 m is bridged and not climbed; closer knots are for walls that need them."""
-_SCATTER, _FOLLOWED = 0.0015, 2.5
+_SCATTER, _FOLLOWED = 0.0012, 2.5
 """A wall is followed if it scatters less than this about its surface, m, or than so
 many times its noise."""
 _MOST_SPLINES = 4096
@@ -107,9 +107,9 @@ def fit_piece(blocks: Blocks, cells: BoolArray) -> Piece:
         knot = max(distance, least)
         spline = SplineSurface(blocks.y, blocks.x, within=blocks.within, knot=knot)
         piece = _settle(spline, blocks, cells, height, penalties=_PENALTIES)
-        # 1.645: nine tenths of a normal variable are closer to its mean.
+        # 1.282: eight tenths of a normal variable are closer to its mean.
         off = np.abs(blocks.depth - piece.height)[cells]
-        scatter = float(np.quantile(off, 0.9)) / 1.645
+        scatter = float(np.quantile(off, 0.8)) / 1.282
         even = scatter <= max(_SCATTER, _FOLLOWED * blocks.noise)
         if even or blocks.cell > _FINEST * _KNOTS[-1]:
             break

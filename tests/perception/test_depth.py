@@ -76,10 +76,30 @@ def test_holes_in_a_flat_wall_cost_nothing_but_themselves():
     np.testing.assert_array_equal(usable_pixels(depth_mm, MapConfig()), depth_mm > 0)
 
 
-def test_steps_below_the_edge_jump_are_kept():
+def test_steps_that_are_lower_than_errors_of_stereo_are_kept():
     depth_mm = wall(700)
-    depth_mm[:, 20:] = 690  # 1.4 %, against 2 %.
+    depth_mm[:, 20:] = 694  # 0.014 / m is 6.9 mm at 0.7 m.
     assert usable_pixels(depth_mm, MapConfig()).all()
+    depth_mm[:, 20:] = 690
+    usable = usable_pixels(depth_mm, MapConfig(edge_window=7))
+    assert usable[:, :19].all()
+    assert not usable[:, 19:23].any()
+    assert usable[:, 23:].all()
+
+
+def test_far_away_the_share_of_depth_is_the_bound():
+    depth_mm = wall(2000)
+    depth_mm[:, 20:] = 1965  # 0.014 / m is 56 mm at 2 m, 2 % are 40 mm.
+    assert usable_pixels(depth_mm, MapConfig()).all()
+    depth_mm[:, 20:] = 1955
+    assert not usable_pixels(depth_mm, MapConfig(edge_window=7))[:, 19:23].any()
+
+
+def test_near_pixels_beside_a_lone_farther_one_are_kept():
+    depth_mm = wall(700)
+    depth_mm[15, 20] = 720
+    usable = usable_pixels(depth_mm, MapConfig())
+    assert np.argwhere(~usable).tolist() == [[15, 20]]
 
 
 def test_a_lone_flying_pixel_is_dropped():
@@ -93,7 +113,7 @@ def test_depth_out_of_range_is_dropped():
     depth_mm = wall(700)
     depth_mm[:, :10] = 3200
     depth_mm[:, 30:] = 200
-    usable = usable_pixels(depth_mm, MapConfig(edge_jump=100.0))
+    usable = usable_pixels(depth_mm, MapConfig(edge_jump=100.0, edge_step=100.0))
     assert not usable[:, :10].any()
     assert not usable[:, 30:].any()
     assert usable[:, 10:30].all()

@@ -115,7 +115,7 @@ def golden_figures(points: np.ndarray) -> np.ndarray:
     figures = np.full(len(points), np.nan)
     everything = np.arange(len(points))
     spacing = np.sqrt(np.prod(np.ptp(points[:, :2], axis=0)) / len(points))
-    for edge in (5 * spacing, 15 * spacing):
+    for edge in np.array([5, 15, 45, 135]) * spacing:
         cells = np.floor(points / edge).astype(int)
         _, cell_of = np.unique(cells, axis=0, return_inverse=True)
         members = np.split(
