@@ -62,8 +62,8 @@ def clear_strokes(
     reached = linker.limits.contains(q)
     total = sum(stroke.length for stroke in strokes)
     first_time = np.repeat([stroke.kind != "touch_up" for stroke in strokes], counts)
-    lost = np.count_nonzero(first_time & ~reached) * _STEP
-    if lost > _MOST_OUT_OF_REACH * total or not reached.any():
+    missed = np.count_nonzero(first_time & ~reached) * _STEP
+    if missed > _MOST_OUT_OF_REACH * total or not reached.any():
         require_reach(p_TGs, gun=linker.gun, limits=linker.limits, what="strokes")
     free = np.array(reached)
     free[reached] = linker.space.free(q[reached])
