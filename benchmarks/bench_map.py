@@ -7,7 +7,6 @@ over 2 x 2 m, seed 7. CPU is of the whole process, also what runs on a second co
 """
 
 import argparse
-import dataclasses
 import resource
 import time
 
@@ -75,7 +74,7 @@ def run_row(row: str, rate: float) -> None:
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     report = session_report(mapper, result)
     placed, total = len(result.poses), len(truth)
-    print(f"{row}: {placed} of {total} frames, {len(mapper.keyframes)} keyframes")
+    print(f"{row}: {placed} of {total} frames, {len(mapper.graph.keyframes)} keyframes")
     if row == "wrong-links":
         print(f"  ATE without the wrong links {ate(clean.poses, truth):.2f} mm")
     print(
@@ -86,7 +85,7 @@ def run_row(row: str, rate: float) -> None:
     print_surface(result)
     if with_arm:
         print_observed(mapper, result, truth, arm, report)
-    count = len(mapper.keyframes)
+    count = len(mapper.graph.keyframes)
     timing = report["timing"]
     print(
         f"  CPU a keyframe: {1e3 * timing['cpu_per_keyframe_s']:.0f} ms mean, "
@@ -100,11 +99,12 @@ def run_row(row: str, rate: float) -> None:
 def spoil_links(mapper: Mapper) -> None:
     """Moves every tenth link by 2 to 5 cm and 2 deg."""
     rng = np.random.default_rng(SEED)
-    for index in range(0, len(mapper.links), 10):
+    links = list(mapper.graph.links)
+    for index in range(0, len(links), 10):
         shift = rng.choice([-1, 1], 3) * rng.uniform(0.02, 0.05, 3)
         X = RigidTransform(RollPitchYaw(0.035, 0.0, -0.035), shift)
-        link = mapper.links[index]
-        mapper.links[index] = dataclasses.replace(link, X_ij=link.X_ij @ X)
+        links[index] = links[index].replace(X_ij=links[index].X_ij @ X)
+    mapper.graph = mapper.graph.replace(links=tuple(links))
 
 
 def ate(
@@ -148,19 +148,22 @@ def print_surface(result: MappingResult) -> None:
 
 def print_observed(mapper, result, truth, arm, report) -> None:
     """Prints the camera's errors to the wall before and after, and what was moved."""
-    by_arm = [arm[keyframe.time] for keyframe in mapper.keyframes]
+    by_arm = [arm[keyframe.time] for keyframe in mapper.graph.keyframes]
     # The best plane of the map that the arm's poses would make.
     middles = np.array(
-        [X @ k.planes[0].center for X, k in zip(by_arm, mapper.keyframes, strict=True)]
+        [
+            X @ k.planes[0].center
+            for X, k in zip(by_arm, mapper.graph.keyframes, strict=True)
+        ]
     )
     normal = np.linalg.svd(middles - middles.mean(axis=0))[2][2]
     normal *= np.sign(normal[2])
     before = plane_errors(
         mapper, by_arm, [*normal, normal @ middles.mean(axis=0)], truth
     )
-    seen = np.bincount([s.plane for s in mapper.sightings])
-    plane = result.estimate.planes[int(np.argmax(seen))]
-    after = plane_errors(mapper, result.keyframe_poses, plane, truth)
+    seen = np.bincount([s.plane for s in mapper.graph.sightings])
+    plane = result.solution.estimate.planes[int(np.argmax(seen))]
+    after = plane_errors(mapper, result.solution.graph.poses, plane, truth)
     for name, unit, old, new in zip(
         ("tilt to the wall", "distance to it"),
         ("deg", "mm"),
@@ -175,7 +178,7 @@ def print_observed(mapper, result, truth, arm, report) -> None:
 
 def plane_errors(mapper, poses, plane, truth) -> tuple[float, float]:
     errors = []
-    for keyframe, X_WC in zip(mapper.keyframes, poses, strict=True):
+    for keyframe, X_WC in zip(mapper.graph.keyframes, poses, strict=True):
         X_true = truth[keyframe.time]
         seen = X_WC.rotation().inverse() @ np.array(plane[:3])
         true = X_true.rotation().inverse() @ np.array([0.0, 0.0, 1.0])

@@ -47,8 +47,8 @@ def main() -> None:
         )
     for name in TABLES:
         mapper, result = mapped(data / "d415_on_robot_arm" / name, TABLE, True)
-        before = disagreement(mapper, [k.X_arm for k in mapper.keyframes])
-        after = disagreement(mapper, result.keyframe_poses)
+        before = disagreement(mapper, [k.X_arm for k in mapper.graph.keyframes])
+        after = disagreement(mapper, result.solution.graph.poses)
         print(
             f"{name}: planes {before[0]:.2f} deg, {before[1]:.2f} mm apart -> "
             f"{after[0]:.3f} deg, {after[1]:.3f} mm"
@@ -63,7 +63,7 @@ def mapped(folder, config, use_poses):
 
 def disagreement(mapper, poses) -> tuple[float, float]:
     """Angle, deg, and distance, mm, between the first planes of two keyframes."""
-    sights = [keyframe.planes[0] for keyframe in mapper.keyframes]
+    sights = [keyframe.planes[0] for keyframe in mapper.graph.keyframes]
     normals = [X.rotation() @ s.normal for X, s in zip(poses, sights, strict=True)]
     centers = [X @ s.center for X, s in zip(poses, sights, strict=True)]
     mean = sum(normals) / np.linalg.norm(sum(normals))

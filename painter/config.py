@@ -30,6 +30,7 @@ from perception.config import (
     StereoConfig,
     check_positive,
 )
+from perception.mapping.config import PoseGraphConfig
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -139,6 +140,7 @@ class Scenario:
     tile: TileConfig = dataclasses.field(default_factory=TileConfig)
     scan: ScanConfig = dataclasses.field(default_factory=ScanConfig)
     map: MapConfig = dataclasses.field(default_factory=MapConfig)
+    pose_graph: PoseGraphConfig = dataclasses.field(default_factory=PoseGraphConfig)
     segmentation: SegmentationConfig = dataclasses.field(
         default_factory=SegmentationConfig
     )
@@ -178,6 +180,7 @@ class Scenario:
             self.tile,
             self.scan,
             self.map,
+            self.pose_graph,
             self.segmentation,
             self.raster,
             self.motion,

@@ -24,6 +24,7 @@ IN_TREE = {
         "painter.planning.config",
         "painter.resources",
         "perception.config",
+        "perception.mapping.config",
     },
     "painter.planning": {"painter.errors", "painter.planning", "perception"},
     "painter.canopen": {"painter.canopen", "painter.errors"},

@@ -72,6 +72,7 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
         "map_accumulator",
         MapAccumulator(
             config=scenario.map,
+            pose_graph=scenario.pose_graph,
             intrinsics=CameraIntrinsics.from_stereo(scenario.wall_camera.stereo),
             tile=scenario.tile,
             X_WT=X_WT_expected,

@@ -1,4 +1,4 @@
-"""Fuses depth pictures into one map of the wall."""
+"""Fuses depth pictures into one map of the wall, and corrects it."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,10 @@ from painter.planning.config import TileConfig
 from painter.systems.ports import EvalAs
 from painter.systems.values import StageResult
 from perception.config import MapConfig
-from perception.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth import CameraIntrinsics
+from perception.mapping.config import PoseGraphConfig
+from perception.mapping.live_map import LiveMap
 from perception.values import FrozenValue, SurfaceMap, Wall
-from perception.voxel_map import VoxelMap
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,19 +23,19 @@ class MapProgress(FrozenValue):
     """How far the map is.
 
     Attributes:
-        voxels: The map.
+        map: The map.
         image_time: Of the last picture fused, s; -1 = none yet.
         wall_number: Of the StageResult whose wall the map is laid on; 0 = the nominal
             one.
     """
 
-    voxels: VoxelMap
+    map: LiveMap
     image_time: float = -1.0
     wall_number: int = 0
 
 
 class MapAccumulator(LeafSystem):
-    """Fuses depth pictures into one voxel map, laid along the wall.
+    """Fuses depth pictures into one map, laid along the wall.
 
     .. pydrake_system::
 
@@ -56,7 +57,9 @@ class MapAccumulator(LeafSystem):
         wall: StageResult; each new one that holds a Wall restarts the map in that
             wall's tile frame. May be left unconnected.
         enabled: (1,); 0 = fuse nothing. May be left unconnected: all is fused.
-        surface_map: SurfaceMap in W of all that was fused since the last restart.
+        surface_map: SurfaceMap in W of all that was fused since the last restart, at
+            the poses that the pose graph makes of the arm's; see `LiveMap`. Costs up to
+            some seconds to evaluate, once after each picture.
 
     State is one MapProgress, updated every `period` s, first at t = 0. Each picture is
     fused once; one taken while `enabled` was 0 is not fused later unless it is still
@@ -67,6 +70,7 @@ class MapAccumulator(LeafSystem):
         self,
         *,
         config: MapConfig,
+        pose_graph: PoseGraphConfig,
         intrinsics: CameraIntrinsics,
         tile: TileConfig,
         X_WT: RigidTransform,
@@ -76,6 +80,7 @@ class MapAccumulator(LeafSystem):
 
         Args:
             config: Of the map.
+            pose_graph: Of what corrects the arm's poses.
             intrinsics: Of the depth camera.
             tile: Its size is used.
             X_WT: Where the tile is expected, until `wall` says better.
@@ -87,8 +92,6 @@ class MapAccumulator(LeafSystem):
         super().__init__()
         if not (np.isfinite(period) and period > 0.0):
             raise ValueError(f"period must be > 0 s, got {period!r}.")
-        self._config = config
-        self._intrinsics = intrinsics
         # Inputs.
         self._depth_port = self.DeclareAbstractInputPort(
             "depth_image", Value(ImageDepth16U(intrinsics.width, intrinsics.height))
@@ -98,8 +101,10 @@ class MapAccumulator(LeafSystem):
         self._wall_port = self.DeclareAbstractInputPort("wall", Value(StageResult()))
         self._enabled_port = self.DeclareVectorInputPort("enabled", 1)
         # State.
-        voxels = VoxelMap.empty(X_WT, tile.width, tile.height, config)
-        self._progress_index = self.DeclareAbstractState(Value(MapProgress(voxels)))
+        empty = LiveMap.empty(
+            X_WT, (tile.width, tile.height), config, intrinsics, pose_graph
+        )
+        self._progress_index = self.DeclareAbstractState(Value(MapProgress(empty)))
         # Outputs.
         self.DeclareAbstractOutputPort(
             "surface_map",
@@ -116,7 +121,7 @@ class MapAccumulator(LeafSystem):
     def _CalcSurfaceMap(self, context: Context, output: Value) -> None:
         # The map keeps its surface: Drake's cache is emptied by every event, changed
         # or not.
-        output.set_value(self._Progress(context).voxels.surface_map)
+        output.set_value(self._Progress(context).map.surface_map)
 
     def _UpdateMap(self, context: Context, state: State) -> EventStatus:
         before = self._Progress(context)
@@ -134,11 +139,8 @@ class MapAccumulator(LeafSystem):
         result = EvalAs(self._wall_port, context, StageResult)
         if result.number == progress.wall_number or not isinstance(result.value, Wall):
             return progress
-        old = progress.voxels
-        voxels = VoxelMap.empty(
-            result.value.X_WT, old.width, old.height, config=self._config
-        )
-        return progress.replace(voxels=voxels, wall_number=result.number)
+        empty = progress.map.restarted(result.value.X_WT)
+        return progress.replace(map=empty, wall_number=result.number)
 
     def _Fuse(self, context: Context, progress: MapProgress) -> MapProgress:
         """Returns the map with the last picture in it, if that is a new one."""
@@ -150,12 +152,7 @@ class MapAccumulator(LeafSystem):
         if image_time < 0.0 or image_time == progress.image_time:
             return progress
         depth_mm = EvalAs(self._depth_port, context, ImageDepth16U).data[:, :, 0]
-        X_WC = EvalAs(self._pose_port, context, RigidTransform)
-        p_CQs = backproject(
-            depth_mm,
-            usable_pixels(depth_mm, self._config),
-            self._intrinsics,
-            self._config.stride,
-        )
-        voxels = progress.voxels.fuse(X_WC @ p_CQs, X_WC.translation())
-        return progress.replace(voxels=voxels, image_time=image_time)
+        # A copy: what the port gives out is overwritten with the next pose.
+        X_WC = RigidTransform(EvalAs(self._pose_port, context, RigidTransform))
+        fused = progress.map.fused(image_time, depth_mm, X_WC)
+        return progress.replace(map=fused, image_time=image_time)

@@ -1,13 +1,17 @@
 """Settings of the mapper: every field with its default, unit and bound."""
 
 import dataclasses
+import math
 
 from perception.config import check_positive
 
 
 @dataclasses.dataclass(kw_only=True)
-class MapperConfig:
-    """How frames become keyframes, links and one surface.
+class PoseGraphConfig:
+    """How frames become keyframes, and keyframes a pose graph.
+
+    The defaults are those of the arm's own scan: its poses are good, the wall's planes
+    correct them, and links between keyframes would cost ten times as much.
 
     The first block of sigmas is what is known before anything was measured: how far the
     arm's poses may be off. The second is what measurements are good for at best, since
@@ -33,18 +37,17 @@ class MapperConfig:
         plane_share: Planes with a smaller share of the points are left out.
         features: Corners looked for in a keyframe.
         min_inliers: A link by appearance has so many matches at least.
-        max_links: Older keyframes that a new one is registered to, at most.
+        max_links: Older keyframes that a new one is registered to, at most; 0 = none,
+            so that planes alone correct the arm.
         observed_ratio: A direction is observed if links and planes cut its standard
             deviation to this share of the arm's.
         optimize_every: Keyframes between optimisations while frames come in.
-        reject_chi2: A link this far off, in squared sigmas, is dropped.
-        cell: Edge of a voxel in the map, m.
-        layer: Its height along the main plane's normal, m.
         max_range: Farthest depth used, m.
-        stride: Every so many-th pixel and row is fused.
+        refuse_distance: A map that is corrected while the arm scans is fused again if
+            the correction moves the surface farther than this, m, root mean square.
     """
 
-    keyframe_distance: float = 0.10
+    keyframe_distance: float = 0.20
     keyframe_angle_deg: float = 6.0
     keyframe_coverage: float = 0.25
     arm_sigma: float = 0.001
@@ -62,20 +65,40 @@ class MapperConfig:
     plane_share: float = 0.08
     features: int = 500
     min_inliers: int = 25
-    max_links: int = 5
+    max_links: int = 0
     observed_ratio: float = 0.1
     optimize_every: int = 5
-    reject_chi2: float = 60.0
-    cell: float = 0.005
-    layer: float = 0.015
     max_range: float = 3.0
-    stride: int = 3
+    refuse_distance: float = 0.001
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
-        check_positive("mapping", **dataclasses.asdict(self))
+        numbers = dataclasses.asdict(self)
+        if not 0 <= numbers.pop("max_links") < math.inf:
+            raise ValueError(f"mapping.max_links must be >= 0, got {self.max_links!r}.")
+        check_positive("mapping", **numbers)
         for name in ("keyframe_coverage", "plane_share", "observed_ratio"):
             if getattr(self, name) >= 1.0:
                 raise ValueError(
                     f"mapping.{name} must be < 1, got {getattr(self, name)!r}."
                 )
+
+
+@dataclasses.dataclass(kw_only=True)
+class MapperConfig(PoseGraphConfig):
+    """How a sequence becomes poses and one surface.
+
+    Attributes:
+        cell: Edge of a voxel in the map, m.
+        layer: Its height along the main plane's normal, m.
+        stride: Every so many-th pixel and row is fused.
+        keyframe_distance: As in `PoseGraphConfig`; nearer, so that a camera without
+            poses is followed.
+        max_links: As in `PoseGraphConfig`.
+    """
+
+    keyframe_distance: float = 0.10
+    max_links: int = 5
+    cell: float = 0.005
+    layer: float = 0.015
+    stride: int = 3

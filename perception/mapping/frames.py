@@ -25,6 +25,9 @@ CAMERA_FILE = "camera.json"
 TRUTH_FILE = "groundtruth.txt"
 ARM_FILE = "arm.txt"
 
+DepthImage = npt.NDArray[np.uint16]
+ColorImage = npt.NDArray[np.uint8]
+
 _NUMBERED = re.compile(r"^(?:frame-(\d+)\.depth|depth_(\d+))\.png$")
 
 
@@ -40,8 +43,8 @@ class Frame(FrozenValue):
     """
 
     time: float
-    depth_mm: npt.NDArray[np.uint16]
-    color: npt.NDArray[np.uint8]
+    depth_mm: DepthImage
+    color: ColorImage
     X_WC: RigidTransform | None = None
 
 

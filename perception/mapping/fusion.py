@@ -86,7 +86,7 @@ def fuse(
     sums = sums[:, real]
     mean = sums[1:5] / sums[0]
     p_VQs = mean[:3]
-    open_air = _seen_through(X_WV @ p_VQs, keyframes, poses, intrinsics, config)
+    open_air = _seen_through(X_WV @ p_VQs, keyframes, poses, intrinsics)
     sums, mean, p_VQs = sums[:, ~open_air], mean[:, ~open_air], p_VQs[:, ~open_air]
     p_WQs = X_WV @ p_VQs if p_VQs.size else np.zeros((3, 0))
     return FusedMap(
@@ -135,22 +135,26 @@ def write_mesh(path: Path, fused: FusedMap, depth: int = 9) -> int:
 
 
 def _pixels(
-    keyframe: Keyframe, intrinsics: CameraIntrinsics, config: MapperConfig
+    keyframe: Keyframe, intrinsics: CameraIntrinsics
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.uint8]]:
     """Returns p_CQs (3, N), weights and colours of a keyframe's pixels."""
-    row, column = np.nonzero(keyframe.depth_mm)
-    z = keyframe.depth_mm[row, column] / 1000.0
-    x = (config.stride * column - intrinsics.cx) / intrinsics.fx
-    y = (config.stride * row - intrinsics.cy) / intrinsics.fy
-    height, width = keyframe.grid.valid.shape
-    normals = keyframe.grid.normals[
-        np.minimum(config.stride * row // BLOCK, height - 1),
-        np.minimum(config.stride * column // BLOCK, width - 1),
+    picture = keyframe.picture
+    if picture is None:
+        raise ValueError(f"keyframe {keyframe.number} was kept without its picture.")
+    depth_mm, stride = picture.depth_mm, picture.stride
+    row, column = np.nonzero(depth_mm)
+    z = depth_mm[row, column] / 1000.0
+    x = (stride * column - intrinsics.cx) / intrinsics.fx
+    y = (stride * row - intrinsics.cy) / intrinsics.fy
+    height, width = keyframe.z.shape
+    normals = keyframe.grid(intrinsics).normals[
+        np.minimum(stride * row // BLOCK, height - 1),
+        np.minimum(stride * column // BLOCK, width - 1),
     ]
     along = -(normals[:, 0] * x + normals[:, 1] * y + normals[:, 2])
     cos = np.where(along > 0, along / np.sqrt(1 + x * x + y * y), _UNKNOWN_COS)
     weights = (_GOOD_RANGE / z) ** 4 * cos**2
-    return np.stack([x * z, y * z, z]), weights, keyframe.color[row, column]
+    return np.stack([x * z, y * z, z]), weights, picture.colors[row, column]
 
 
 def _voxels(
@@ -164,7 +168,7 @@ def _voxels(
     The rows of the sums: weight, weighted x, y, z and z², red, green, blue, pixels,
     frames, layer.
     """
-    p_CQs, weights, colors = _pixels(keyframe, intrinsics, config)
+    p_CQs, weights, colors = _pixels(keyframe, intrinsics)
     p_VQs = X_VC @ p_CQs if p_CQs.size else p_CQs
     size = np.array([config.cell, config.cell, config.layer])[:, None]
     i, j, k = np.floor(p_VQs / size + [[0.0], [0.0], [0.5]]).astype(np.int64) + _REACH
@@ -219,7 +223,6 @@ def _seen_through(
     keyframes: Sequence[Keyframe],
     poses: Sequence[RigidTransform],
     intrinsics: CameraIntrinsics,
-    config: MapperConfig,
 ) -> BoolArray:
     """Finds points that more keyframes see through than see."""
     through = np.zeros(p_WQs.shape[1], dtype=np.int32)
@@ -227,16 +230,19 @@ def _seen_through(
     if not p_WQs.size:
         return through > 0
     for keyframe, X_WC in list(zip(keyframes, poses, strict=True))[::_CARVERS]:
+        picture = keyframe.picture
+        if picture is None:
+            continue
         x, y, z = X_WC.inverse() @ p_WQs
         ahead = np.flatnonzero(z > 0.1)
         depth_of = z[ahead]
-        u = (intrinsics.fx * x[ahead] / depth_of + intrinsics.cx) / config.stride
-        v = (intrinsics.fy * y[ahead] / depth_of + intrinsics.cy) / config.stride
-        height, width = keyframe.depth_mm.shape
+        u = (intrinsics.fx * x[ahead] / depth_of + intrinsics.cx) / picture.stride
+        v = (intrinsics.fy * y[ahead] / depth_of + intrinsics.cy) / picture.stride
+        height, width = picture.shape
         inside = (u > 0) & (u < width - 1) & (v > 0) & (v < height - 1)
         ahead, z_in = ahead[inside], depth_of[inside]
         row, column = np.rint(v[inside]).astype(int), np.rint(u[inside]).astype(int)
-        depth = keyframe.depth_mm[row, column] / 1000.0
+        depth = picture.depth_mm[row, column] / 1000.0
         margin = _SEEN_THROUGH * (1.0 + z_in)
         through[ahead] += depth > z_in + margin
         seen[ahead] += np.abs(depth - z_in) <= margin

@@ -14,14 +14,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from perception.mapping.config import MapperConfig
+from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframe import PlaneSight
 from perception.mapping.links import Link
+from perception.mapping.normal_equations import NormalEquations
+from perception.mapping.observability import information_of
 from perception.mapping.poses import Poses, skew
-from perception.values import BoolArray, FloatArray, IntArray
+from perception.values import BoolArray, FloatArray
 
 _SCHEDULE = (1e5, 1e4, 1e3, 100.0, 30.0, 30.0, 30.0)
 """Squared sigmas at which a link's weight has fallen to a quarter, round by round."""
@@ -33,8 +33,6 @@ _WALK = 4.0
 """The same for steps of the base, which are rare and large (Cauchy's weights)."""
 _HALVED = 0.25
 """Of a variance whose standard deviation was halved."""
-_WEAK = 1e-3
-"""Prior on what nothing else holds, in inverse squared metres or radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,72 +93,10 @@ class Estimate:
     observed: FloatArray = field(repr=False)
 
 
-@dataclass
-class _System:
-    """Normal equations, added up block by block."""
-
-    size: int
-    slope: FloatArray = field(init=False)
-    rows: list[IntArray] = field(default_factory=list)
-    columns: list[IntArray] = field(default_factory=list)
-    values: list[FloatArray] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.slope = np.zeros(self.size)
-
-    def add(
-        self, parts: list[tuple[IntArray, FloatArray]], e: FloatArray, W: FloatArray
-    ) -> None:
-        """Adds factors.
-
-        Args:
-            parts: First unknown (f,) and Jacobian (f, r, c) of each part.
-            e: (f, r) residuals.
-            W: (f, r, r) their information.
-        """
-        for start, J in parts:
-            JW = np.swapaxes(J, 1, 2) @ W
-            index = start[:, None] + np.arange(J.shape[2])
-            np.add.at(self.slope, index, np.einsum("fcr,fr->fc", JW, e))
-            for start2, J2 in parts:
-                index2 = start2[:, None] + np.arange(J2.shape[2])
-                block = JW @ J2
-                self.values.append(block.ravel())
-                self.rows.append(
-                    np.broadcast_to(index[:, :, None], block.shape).ravel()
-                )
-                self.columns.append(
-                    np.broadcast_to(index2[:, None, :], block.shape).ravel()
-                )
-
-    def solve(self, block: int) -> tuple[FloatArray, FloatArray]:
-        """Returns the step that makes the slope vanish.
-
-        Args:
-            block: First of the six unknowns whose (6, 6) covariance is returned too.
-        """
-        everywhere = np.arange(self.size)
-        matrix = sparse.csc_matrix(
-            (
-                np.concatenate([*self.values, np.full(self.size, _WEAK)]),
-                (
-                    np.concatenate([*self.rows, everywhere]),
-                    np.concatenate([*self.columns, everywhere]),
-                ),
-            ),
-            shape=(self.size, self.size),
-        )
-        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A")
-        units = np.zeros((self.size, 6))
-        units[block : block + 6] = np.eye(6)
-        covariance = factors.solve(units)[block : block + 6]
-        return -factors.solve(self.slope), np.asarray(covariance)
-
-
 class Graph:
     """Optimises one `Problem`; makes its arrays once."""
 
-    def __init__(self, problem: Problem, config: MapperConfig) -> None:
+    def __init__(self, problem: Problem, config: PoseGraphConfig) -> None:
         """Lays the problem out in arrays.
 
         Args:
@@ -183,7 +119,7 @@ class Graph:
         self._arm = np.flatnonzero(problem.has_arm)
         middle = problem.X_WC.p.mean(axis=0) if self._n else np.zeros(3)
         self._middle = middle
-        self._mount_prior = _information(config.mount_sigma, config.mount_sigma_deg)
+        self._mount_prior = information_of(config.mount_sigma, config.mount_sigma_deg)
 
     def optimize(self, quick: bool = False) -> Estimate:
         """Finds the most likely poses, with the mount's error where it is observed.
@@ -219,7 +155,7 @@ class Graph:
         link_weights = np.ones(len(problem.links))
         sight_weights = np.ones(len(problem.sightings))
         for scale in schedule:
-            system = _System(12 * n + 6 + 3 * m)
+            system = NormalEquations(12 * n + 6 + 3 * m)
             link_weights = self._add_links(system, X, scale)
             sight_weights = self._add_planes(system, X, planes, scale)
             self._add_arm(system, X, mount, base, mount_prior, scale > _LOOSE)
@@ -242,7 +178,7 @@ class Graph:
             observed=self._observed(X, planes, link_weights, sight_weights),
         )
 
-    def _add_links(self, system: _System, X: Poses, scale: float) -> FloatArray:
+    def _add_links(self, system: NormalEquations, X: Poses, scale: float) -> FloatArray:
         if not len(self._i):
             return np.zeros(0)
         e, Ji, Jj = self._link_terms(X)
@@ -293,7 +229,7 @@ class Graph:
         return e, J_pose, J_plane
 
     def _add_planes(
-        self, system: _System, X: Poses, planes: FloatArray, scale: float
+        self, system: NormalEquations, X: Poses, planes: FloatArray, scale: float
     ) -> FloatArray:
         if not len(self._k):
             return np.zeros(0)
@@ -308,7 +244,7 @@ class Graph:
 
     def _add_arm(
         self,
-        system: _System,
+        system: NormalEquations,
         X: Poses,
         mount: Poses,
         base: Poses,
@@ -335,7 +271,7 @@ class Graph:
         J_base[:, 3:, :3] = R_T @ skew(about.p)
         J_base[:, 3:, 3:] = -R_T
         W = np.tile(
-            _information(config.arm_sigma, config.arm_sigma_deg), (len(k), 1, 1)
+            information_of(config.arm_sigma, config.arm_sigma_deg), (len(k), 1, 1)
         )
         middle = np.full(len(k), 12 * n)
         system.add([(6 * k, ones), (6 * n + 6 * k, J_base), (middle, -ones)], e, W)
@@ -349,10 +285,10 @@ class Graph:
         if n > 1:
             self._add_walk(system, base, loose)
 
-    def _add_walk(self, system: _System, base: Poses, loose: bool) -> None:
+    def _add_walk(self, system: NormalEquations, base: Poses, loose: bool) -> None:
         n = self._n
         e = base[np.arange(n - 1)].steps_to(base[np.arange(1, n)])
-        W = _information(self._config.base_sigma, self._config.base_sigma_deg)
+        W = information_of(self._config.base_sigma, self._config.base_sigma_deg)
         chi2 = np.einsum("fi,ij,fj->f", e, W, e)
         # Loose first, so that a step shows where it is; then steps are rare.
         share = np.full(n - 1, 0.01) if loose else _WALK / (_WALK + chi2)
@@ -376,38 +312,6 @@ class Graph:
             W = self._plane_omega * sights[:, None]
             np.add.at(result, self._k, np.swapaxes(J, 1, 2) @ (J * W[:, :, None]))
         return result
-
-
-def prior_sigmas(config: MapperConfig) -> FloatArray:
-    """Returns (6,) standard deviations of an arm's pose, with its mount's error."""
-    turn = np.deg2rad(np.hypot(config.arm_sigma_deg, config.mount_sigma_deg))
-    shift = np.hypot(config.arm_sigma, config.mount_sigma)
-    return np.array([turn] * 3 + [shift] * 3)
-
-
-def observed_directions(information: FloatArray, config: MapperConfig) -> FloatArray:
-    """Finds the directions that links and planes determine.
-
-    A direction is observed if the information cuts the arm's standard deviation along
-    it to `observed_ratio`.
-
-    Args:
-        information: (6, 6) of one keyframe, from links and planes.
-        config: Sigmas of arm and mount.
-
-    Returns:
-        (6, 6) projection on the observed directions, of steps in units of
-        `prior_sigmas`; symmetric.
-    """
-    sigma = prior_sigmas(config)
-    values, axes = np.linalg.eigh(information * np.outer(sigma, sigma))
-    kept = axes[:, values > 1.0 / config.observed_ratio**2 - 1.0]
-    return np.asarray(kept @ kept.T)
-
-
-def _information(sigma: float, sigma_deg: float) -> FloatArray:
-    turn = np.deg2rad(sigma_deg)
-    return np.diag([turn**-2.0] * 3 + [sigma**-2.0] * 3)
 
 
 def _tangents(planes: FloatArray) -> FloatArray:

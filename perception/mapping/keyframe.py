@@ -1,6 +1,8 @@
 """What is taken from one frame: a grid of oriented points, planes and features."""
 
+import zlib
 from dataclasses import dataclass
+from typing import Self
 
 import cv2
 import numpy as np
@@ -9,8 +11,8 @@ from pydrake.math import RigidTransform
 
 from perception.config import MapConfig
 from perception.depth import CameraIntrinsics, usable_pixels
-from perception.mapping.config import MapperConfig
-from perception.mapping.frames import Frame
+from perception.mapping.config import MapperConfig, PoseGraphConfig
+from perception.mapping.frames import ColorImage, DepthImage, Frame
 from perception.planes import fit_plane, ransac_plane
 from perception.values import BoolArray, FloatArray, FrozenValue
 
@@ -60,30 +62,80 @@ class Features(FrozenValue):
     p_Cs: FloatArray
     descriptors: npt.NDArray[np.uint8]
 
+    @classmethod
+    def none(cls) -> Self:
+        """Makes an empty set."""
+        return cls(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 32), np.uint8))
+
 
 @dataclass(frozen=True, eq=False)
-class Keyframe(FrozenValue):
-    """What is kept of a frame; full pictures are not.
+class ThinPicture(FrozenValue):
+    """Every `stride`-th pixel and row of a picture, compressed.
 
     Attributes:
-        number: Of the frame, counted from 0.
-        time: s.
-        X_arm: Pose that the arm gave; None = unknown.
-        grid: Mean points.
-        planes: Largest first.
-        features: Corners.
-        depth_mm: (h, w) uint16, usable depth at every `stride`-th pixel, 0 = none.
-        color: (h, w, 3) uint8, RGB, the same pixels.
+        stride: Of the pixels kept.
+        shape: (h, w) of what is kept.
+        depth: Usable depth, uint16, mm, 0 = none; zlib.
+        color: Its colours, JPEG; None = not kept.
     """
 
-    number: int
-    time: float
-    X_arm: RigidTransform | None
-    grid: "PointGrid"
-    planes: tuple[PlaneSight, ...]
-    features: Features
-    depth_mm: npt.NDArray[np.uint16]
-    color: npt.NDArray[np.uint8]
+    stride: int
+    shape: tuple[int, int]
+    depth: bytes
+    color: bytes | None = None
+
+    @classmethod
+    def of(
+        cls,
+        depth_mm: DepthImage,
+        usable: BoolArray,
+        stride: int,
+        color: ColorImage | None = None,
+    ) -> Self:
+        """Packs a picture.
+
+        Args:
+            depth_mm: (H, W) uint16, mm.
+            usable: (H, W) bool, the pixels whose depth is kept.
+            stride: Every so many-th pixel and row is kept.
+            color: (H, W, 3) uint8, RGB, if that is wanted, too.
+        """
+        thin = np.s_[::stride, ::stride]
+        kept = np.where(usable[thin], depth_mm[thin], np.uint16(0))
+        jpeg = None
+        if color is not None:
+            _, data = cv2.imencode(".jpg", color[thin][:, :, ::-1])
+            jpeg = data.tobytes()
+        shape = (kept.shape[0], kept.shape[1])
+        return cls(stride, shape, zlib.compress(kept.tobytes(), 1), jpeg)
+
+    def camera(self, intrinsics: CameraIntrinsics) -> CameraIntrinsics:
+        """Returns the camera that would have taken the thinned picture.
+
+        Args:
+            intrinsics: Of the one that took the full picture.
+        """
+        return CameraIntrinsics(
+            fx=intrinsics.fx / self.stride,
+            fy=intrinsics.fy / self.stride,
+            cx=intrinsics.cx / self.stride,
+            cy=intrinsics.cy / self.stride,
+            width=self.shape[1],
+            height=self.shape[0],
+        )
+
+    @property
+    def depth_mm(self) -> DepthImage:
+        """Unpacks (h, w) uint16, mm, 0 = none."""
+        return np.frombuffer(zlib.decompress(self.depth), np.uint16).reshape(self.shape)
+
+    @property
+    def colors(self) -> ColorImage:
+        """Unpacks (h, w, 3) uint8, RGB; black where no colours were kept."""
+        if self.color is None:
+            return np.zeros((*self.shape, 3), np.uint8)
+        image = cv2.imdecode(np.frombuffer(self.color, np.uint8), cv2.IMREAD_COLOR)
+        return np.asarray(image)[:, :, ::-1].astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +151,39 @@ class PointGrid(FrozenValue):
     points: FloatArray
     normals: FloatArray
     valid: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframe(FrozenValue):
+    """What is kept of a frame; full pictures are not.
+
+    Attributes:
+        number: Of the frame, counted from 0.
+        time: s.
+        X_arm: Pose that the arm gave; None = unknown.
+        z: (h, w) float32, m, mean depth of blocks of pixels, 0 = none; see `grid_of`.
+        planes: Largest first.
+        features: Corners.
+        picture: Pixels for the fusion; None where others keep them.
+    """
+
+    number: int
+    time: float
+    X_arm: RigidTransform | None
+    z: npt.NDArray[np.float32]
+    planes: tuple[PlaneSight, ...]
+    features: Features
+    picture: ThinPicture | None = None
+
+    def grid(self, intrinsics: CameraIntrinsics) -> PointGrid:
+        """Returns its mean points with their normals."""
+        return grid_of(self.z, intrinsics)
+
+    def points(self, intrinsics: CameraIntrinsics, step: int) -> FloatArray:
+        """Returns every `step`-th of its mean points, (3, n), m, in C."""
+        row, column = np.nonzero(self.z)
+        row, column = row[::step], column[::step]
+        return _on_rays(row, column, self.z[row, column].astype(float), intrinsics)
 
 
 def make_keyframe(
@@ -118,29 +203,27 @@ def make_keyframe(
         config: Thresholds and sigmas.
     """
     usable = usable_pixels(frame.depth_mm, MapConfig(max_range=config.max_range))
-    grid = make_grid(frame.depth_mm, usable, intrinsics)
-    thin = np.s_[:: config.stride, :: config.stride]
+    z = mean_depth(frame.depth_mm, usable)
     return Keyframe(
         number=number,
         time=frame.time,
         X_arm=frame.X_WC,
-        grid=grid,
-        planes=tuple(see_planes(grid, config, number)),
+        z=z,
+        planes=tuple(see_planes(grid_of(z, intrinsics), config, number)),
         features=features,
-        depth_mm=np.where(usable[thin], frame.depth_mm[thin], 0).astype(np.uint16),
-        color=frame.color[thin].copy(),
+        picture=ThinPicture.of(frame.depth_mm, usable, config.stride, frame.color),
     )
 
 
-def make_grid(
-    depth_mm: npt.NDArray[np.uint16], usable: BoolArray, intrinsics: CameraIntrinsics
-) -> PointGrid:
-    """Averages depth over blocks of pixels and finds normals between them.
+def mean_depth(depth_mm: DepthImage, usable: BoolArray) -> npt.NDArray[np.float32]:
+    """Averages depth over blocks of BLOCK x BLOCK pixels.
 
     Args:
         depth_mm: (H, W) uint16, mm, 0 = no return.
         usable: (H, W) bool, pixels to take.
-        intrinsics: Of the camera.
+
+    Returns:
+        (H // BLOCK, W // BLOCK) float32, m; 0 where too few pixels are usable.
     """
     rows, columns = depth_mm.shape[0] // BLOCK, depth_mm.shape[1] // BLOCK
     shape = (rows, BLOCK, columns, BLOCK)
@@ -149,12 +232,34 @@ def make_grid(
     count = weight.sum(axis=(1, 3))
     total = np.where(weight, depth_mm[cut].reshape(shape), 0).sum(axis=(1, 3))
     valid = count >= _FILLED * BLOCK * BLOCK
-    z = np.where(valid, total / np.maximum(count, 1) / 1000.0, 0.0)
-    middle = (BLOCK - 1) / 2.0
-    x = (BLOCK * np.arange(columns) + middle - intrinsics.cx) / intrinsics.fx * z
-    y = (BLOCK * np.arange(rows) + middle - intrinsics.cy)[:, None] / intrinsics.fy * z
-    points = np.stack([x, y, z], axis=2)
+    mean = np.where(valid, total / np.maximum(count, 1) / 1000.0, 0.0)
+    return mean.astype(np.float32)
+
+
+def grid_of(z: npt.NDArray[np.float32], intrinsics: CameraIntrinsics) -> PointGrid:
+    """Places mean depths on the rays of their blocks and finds normals between them.
+
+    Args:
+        z: (h, w) float32, m, 0 = none; see `mean_depth`.
+        intrinsics: Of the camera.
+    """
+    row, column = np.arange(z.shape[0])[:, None], np.arange(z.shape[1])
+    points = np.moveaxis(_on_rays(row, column, z.astype(float), intrinsics), 0, 2)
+    valid = z > 0
     return PointGrid(points, _normals(points, valid), valid)
+
+
+def _on_rays(
+    row: npt.NDArray[np.intp],
+    column: npt.NDArray[np.intp],
+    z: FloatArray,
+    intrinsics: CameraIntrinsics,
+) -> FloatArray:
+    """Returns the points at depth z on the middles of blocks, stacked x, y, z."""
+    middle = (BLOCK - 1) / 2.0
+    x = (BLOCK * column + middle - intrinsics.cx) / intrinsics.fx * z
+    y = (BLOCK * row + middle - intrinsics.cy) / intrinsics.fy * z
+    return np.stack([x, y, z])
 
 
 def _normals(points: FloatArray, valid: BoolArray) -> FloatArray:
@@ -173,7 +278,7 @@ def _normals(points: FloatArray, valid: BoolArray) -> FloatArray:
     return np.where(known[:, :, None], normals, 0.0)
 
 
-def see_planes(grid: PointGrid, config: MapperConfig, seed: int) -> list[PlaneSight]:
+def see_planes(grid: PointGrid, config: PoseGraphConfig, seed: int) -> list[PlaneSight]:
     """Finds the largest planes in a keyframe.
 
     Args:
@@ -203,7 +308,7 @@ def see_planes(grid: PointGrid, config: MapperConfig, seed: int) -> list[PlaneSi
     return sights
 
 
-def _sight(points: FloatArray, share: float, config: MapperConfig) -> PlaneSight:
+def _sight(points: FloatArray, share: float, config: PoseGraphConfig) -> PlaneSight:
     plane = fit_plane(points)
     center = points.mean(axis=1)
     normal = plane.normal * (-1.0 if plane.normal @ center > 0 else 1.0)
@@ -224,14 +329,14 @@ def _sight(points: FloatArray, share: float, config: MapperConfig) -> PlaneSight
 
 
 def find_features(
-    frame: Frame, intrinsics: CameraIntrinsics, config: MapperConfig
+    frame: Frame, intrinsics: CameraIntrinsics, config: PoseGraphConfig
 ) -> Features:
     """Finds corners that have depth, spread over the picture, with ORB descriptors."""
     grey = cv2.cvtColor(frame.color, cv2.COLOR_RGB2GRAY)
     orb = cv2.ORB.create(nfeatures=config.features, fastThreshold=15, nlevels=4)
     corners, descriptors = orb.detectAndCompute(grey, None)
     if descriptors is None:
-        return Features(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 32), np.uint8))
+        return Features.none()
     uv = np.array([corner.pt for corner in corners])
     column, row = np.rint(uv).astype(int).T
     z = _median_depth(frame.depth_mm)[row, column] / 1000.0
@@ -244,5 +349,5 @@ def find_features(
     )
 
 
-def _median_depth(depth_mm: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
+def _median_depth(depth_mm: DepthImage) -> DepthImage:
     return np.asarray(cv2.medianBlur(depth_mm, 5)).astype(np.uint16)

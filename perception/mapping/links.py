@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
 from perception.depth import CameraIntrinsics
-from perception.mapping.config import MapperConfig
+from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframe import BLOCK, Features, PointGrid
 from perception.mapping.poses import skew
 from perception.values import FloatArray, FrozenValue
@@ -64,7 +64,7 @@ class Link(FrozenValue):
 
 
 def floored(
-    information: FloatArray, config: MapperConfig, complexity: float = 0.0
+    information: FloatArray, config: PoseGraphConfig, complexity: float = 0.0
 ) -> FloatArray:
     """Keeps information honest: no direction is better than the link's floor.
 
@@ -88,7 +88,7 @@ def link_by_appearance(
     a: Features,
     b: Features,
     intrinsics: CameraIntrinsics,
-    config: MapperConfig,
+    config: PoseGraphConfig,
     ends: tuple[int, int],
 ) -> tuple[Link | None, int]:
     """Matches corners, finds the pose by PnP and refines it.
@@ -151,7 +151,7 @@ def _refine(
     first: FloatArray,
     second: FloatArray,
     intrinsics: CameraIntrinsics,
-    config: MapperConfig,
+    config: PoseGraphConfig,
 ) -> tuple[RigidTransform, FloatArray]:
     """Minimises the reprojection error in both pictures and the difference in depth."""
     focal = np.array([intrinsics.fx, intrinsics.fy])
@@ -204,7 +204,7 @@ def link_by_geometry(
     b: PointGrid,
     X_ij: RigidTransform,
     intrinsics: CameraIntrinsics,
-    config: MapperConfig,
+    config: PoseGraphConfig,
     ends: tuple[int, int],
 ) -> Link | None:
     """Registers points to planes, along the directions that the normals determine.

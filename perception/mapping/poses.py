@@ -67,7 +67,7 @@ class Poses:
 
     def moved(self, steps: FloatArray) -> "Poses":
         """Returns the poses after (n, 6) steps."""
-        R = self.R @ Rotation.from_rotvec(steps[:, :3]).as_matrix()
+        R = self.R @ Rotation.from_rotvec(steps[:, :3].copy()).as_matrix()
         return Poses(R, self.p + np.einsum("nij,nj->ni", self.R, steps[:, 3:]))
 
     def steps_to(self, other: "Poses") -> FloatArray:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from perception.mapping.keyframe_graph import Solution
 from perception.mapping.mapper import Mapper, MappingResult
 from perception.values import FloatArray
 
@@ -28,17 +29,18 @@ def session_report(mapper: Mapper, result: MappingResult) -> dict[str, Any]:
     Returns:
         Names and values; all that depends on the machine is under `timing`.
     """
-    kinds = Counter(str(link.kind) for link in mapper.links)
-    estimate, fused = result.estimate, result.fused
+    graph, estimate = result.solution.graph, result.solution.estimate
+    fused = result.fused
+    kinds = Counter(str(link.kind) for link in graph.links)
     R_VW = fused.X_WV.rotation().matrix().T
-    shares, steps = _by_direction(result, R_VW)
-    has_arm = any(keyframe.X_arm is not None for keyframe in mapper.keyframes)
+    shares, steps = _by_direction(result.solution, R_VW)
+    has_arm = graph.has_arm
     z = (fused.X_WV.inverse() @ fused.p_WQs)[2] if fused.p_WQs.size else np.zeros(0)
     z = z[np.abs(z) < _SLAB]
     seconds = np.array(mapper.seconds or [0.0])
     report: dict[str, Any] = {
         "frames": {str(name): count for name, count in mapper.outcomes.items()},
-        "keyframes": len(mapper.keyframes),
+        "keyframes": len(graph.keyframes),
         "links": dict(kinds),
         "links_dropped": int(np.count_nonzero(estimate.link_weights == 0.0)),
         "planes": [
@@ -70,12 +72,12 @@ def session_report(mapper: Mapper, result: MappingResult) -> dict[str, Any]:
 
 
 def _by_direction(
-    result: MappingResult, R_VW: FloatArray
+    solution: Solution, R_VW: FloatArray
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Returns by direction in V: share of keyframes observed, and rms correction."""
     observed, steps = [], []
     for X_WC, projection, step in zip(
-        result.keyframe_poses, result.observed, result.corrections, strict=True
+        solution.graph.poses, solution.observed, solution.corrections, strict=True
     ):
         R_VC = R_VW @ X_WC.rotation().matrix()
         turn, shift = projection[:3, :3], projection[3:, 3:]

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterable
 
+from pydrake.math import RigidTransform
+
 from perception.mapping.frames import Frame
 from perception.mapping.mapper import Mapper, MappingResult, Outcome
 from perception.mapping.store import MapStore
@@ -36,7 +38,7 @@ def run_session(
             _save(mapper, store, number, frame, outcome)
     result = mapper.finish()
     if store is not None:
-        store.save_answer(result.keyframe_poses, mapper.seconds)
+        store.save_answer(result.solution.graph.poses, mapper.seconds)
     return result
 
 
@@ -48,9 +50,10 @@ def _save(
         _, k, X_KC = mapper.placed[-1]
         placed = k, X_KC
     if outcome is Outcome.KEYFRAME:
-        k = len(mapper.keyframes) - 1
-        links = [link for link in mapper.links if link.j == k]
-        store.save_keyframe(k, number, frame, mapper.poses[k], links)
+        graph = mapper.graph
+        k = len(graph.keyframes) - 1
+        links = [link for link in graph.links if link.j == k]
+        store.save_keyframe(k, number, frame, graph.poses[k], links)
     store.save_frame(number, frame.time, outcome, placed)
 
 
@@ -68,10 +71,8 @@ def _restore(mapper: Mapper, store: MapStore) -> int:
         last = max(last, number)
         if k is not None:
             mapper.placed.append((time, k, X_KC))
-    for k, keyframe in enumerate(mapper.keyframes):
+    for k, keyframe in enumerate(mapper.graph.keyframes):
         if keyframe.number not in numbers:  # Killed between the two transactions.
             mapper.outcomes[Outcome.KEYFRAME] += 1
-            mapper.placed.append(
-                (keyframe.time, k, mapper.poses[k].inverse() @ mapper.poses[k])
-            )
+            mapper.placed.append((keyframe.time, k, RigidTransform()))
     return last

@@ -7,7 +7,7 @@ that is killed loses none that was finished.
 import dataclasses
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -147,7 +147,9 @@ class MapStore:
             X_KC = RigidTransform() if pose is None else _pose(pose)
             yield number, time, outcome, k, X_KC
 
-    def save_answer(self, poses: list[RigidTransform], seconds: list[float]) -> None:
+    def save_answer(
+        self, poses: Sequence[RigidTransform], seconds: Sequence[float]
+    ) -> None:
         """Keeps the optimised poses and the CPU time of the keyframes."""
         with self._db:
             self._db.executemany(

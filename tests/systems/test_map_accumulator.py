@@ -12,6 +12,7 @@ from painter.systems.map_accumulator import MapAccumulator
 from painter.systems.values import StageResult
 from perception.config import MapConfig
 from perception.depth import CameraIntrinsics
+from perception.mapping.config import PoseGraphConfig
 from perception.values import SurfaceMap, Wall
 
 CAMERA = CameraIntrinsics(fx=100.0, fy=100.0, cx=59.5, cy=39.5, width=120, height=80)
@@ -27,7 +28,12 @@ class Bench:
     def __init__(self, **settings) -> None:
         config = MapConfig(**({"min_count": 1, "stride": 1} | settings))
         self.dut = MapAccumulator(
-            config=config, intrinsics=CAMERA, tile=TILE, X_WT=X_WT, period=0.2
+            config=config,
+            pose_graph=PoseGraphConfig(),
+            intrinsics=CAMERA,
+            tile=TILE,
+            X_WT=X_WT,
+            period=0.2,
         )
         self.simulator = Simulator(self.dut)
         self.context = self.simulator.get_mutable_context()
@@ -82,6 +88,17 @@ def test_each_picture_is_fused_once():
     assert bench.surface().counts.sum() == 2 * 9600
 
 
+def test_each_picture_keeps_the_pose_it_was_taken_at():
+    bench = Bench()
+    beside = RigidTransform(R_WC, X_WC.translation() + [0.0, 0.3, 0.0])
+    for number, pose in enumerate((X_WC, beside)):
+        bench.show(700, image_time=0.4 * number, pose=pose)
+        bench.simulator.AdvanceTo(0.4 * number + 0.3)
+    pictures = bench.context.get_abstract_state(0).get_value().map.pictures
+    for picture, pose in zip(pictures, (X_WC, beside), strict=True):
+        assert picture.X_arm.IsExactlyEqualTo(pose)
+
+
 def test_nothing_is_fused_while_not_enabled():
     bench = Bench()
     bench.show(700, image_time=0.0)
@@ -106,7 +123,7 @@ def test_a_wall_restarts_the_map_in_its_tile_frame():
     bench.simulator.AdvanceTo(0.5)
     assert bench.surface().frames == 1
     state = bench.context.get_abstract_state(0).get_value()
-    assert state.voxels.X_WV.IsExactlyEqualTo(X_WT_found)
+    assert state.map.voxels.X_WV.IsExactlyEqualTo(X_WT_found)
     bench.show(760, image_time=0.4)
     bench.simulator.AdvanceTo(0.7)
     assert bench.surface().frames == 2  # The same answer restarts once.
@@ -139,5 +156,10 @@ def test_wrong_type_on_the_wall_port_names_the_port():
 def test_bad_period_is_refused():
     with pytest.raises(ValueError, match="period must be > 0"):
         MapAccumulator(
-            config=MapConfig(), intrinsics=CAMERA, tile=TILE, X_WT=X_WT, period=0.0
+            config=MapConfig(),
+            pose_graph=PoseGraphConfig(),
+            intrinsics=CAMERA,
+            tile=TILE,
+            X_WT=X_WT,
+            period=0.0,
         )

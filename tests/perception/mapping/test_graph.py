@@ -3,9 +3,10 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.mapping.config import MapperConfig
-from perception.mapping.graph import Graph, Problem, Sighting, observed_directions
+from perception.mapping.graph import Graph, Problem, Sighting
 from perception.mapping.keyframe import PlaneSight
 from perception.mapping.links import Link, LinkKind
+from perception.mapping.observability import observed_directions
 from perception.mapping.poses import Poses
 
 CONFIG = MapperConfig()

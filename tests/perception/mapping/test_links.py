@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from perception.mapping import keyframe
 from perception.mapping.config import MapperConfig
-from perception.mapping.keyframe import find_features, make_grid
+from perception.mapping.keyframe import find_features
 from perception.mapping.links import floored, link_by_appearance, link_by_geometry
 
 CONFIG = MapperConfig()
@@ -24,7 +25,8 @@ def depth_of(intrinsics, planes, X_WC):
 
 def grid_of(intrinsics, planes, X_WC):
     depth_mm = depth_of(intrinsics, planes, X_WC)
-    return make_grid(depth_mm, depth_mm > 0, intrinsics)
+    z = keyframe.mean_depth(depth_mm, depth_mm > 0)
+    return keyframe.grid_of(z, intrinsics)
 
 
 WALL = [(0.0, 0.0, 1.0, 0.8)]

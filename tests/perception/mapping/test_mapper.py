@@ -53,8 +53,9 @@ def test_on_a_blank_wall_only_distance_and_tilt_are_corrected(blank, blank_scan)
     assert report["correction_rms"]["y_m"] < 2e-4
     # The camera's tilt to the wall: the injected mount error is gone.
     truth = {frame.time: X for frame, X in blank_scan}
-    for keyframe, X_WC in zip(dut.keyframes, result.keyframe_poses, strict=True):
-        seen = X_WC.rotation().inverse() @ result.estimate.planes[0, :3]
+    graph = result.solution.graph
+    for keyframe, X_WC in zip(graph.keyframes, graph.poses, strict=True):
+        seen = X_WC.rotation().inverse() @ graph.planes[0, :3]
         true = truth[keyframe.time].rotation().inverse() @ np.array([0.0, 0.0, 1.0])
         assert np.degrees(np.arccos(min(1.0, seen @ true))) < 0.15
 
@@ -103,7 +104,7 @@ def test_settings_out_of_bounds_are_refused(intrinsics):
 
 def test_the_main_plane_looks_at_the_camera(blank):
     dut, _ = blank
-    X_WV = dut.main_frame()
+    X_WV = dut.graph.main_frame()
     # T is W here: z out of the wall, and the wall at z = 0.
     np.testing.assert_allclose(X_WV.rotation().matrix()[:, 2], [0, 0, 1], atol=0.01)
     off = X_WV.inverse() @ RigidTransform().translation()

@@ -29,7 +29,7 @@ def test_a_broken_session_goes_on_to_the_same_map(blank_scan, intrinsics, tmp_pa
         kept = len(store)
         dut = Mapper(intrinsics, CONFIG)
         result = run_session(dut, frames, store, looked_at.append)
-        assert len(store) == len(dut.keyframes) > kept > 2
+        assert len(store) == len(dut.graph.keyframes) > kept > 2
     assert len(result.poses) == len(whole.poses) == len(frames)
     assert sum(dut.outcomes.values()) == len(frames)
     for (time, X), (time_2, X_2) in zip(result.poses, whole.poses, strict=True):
@@ -49,8 +49,8 @@ def test_pictures_and_links_come_back_as_they_were(textured_scan, intrinsics, tm
         assert (store.intrinsics, store.config) == (intrinsics, CONFIG)
         rows = list(store.keyframes())
     links = [link for row in rows for link in row[3]]
-    assert len(links) == len(dut.links) > 0
-    for old, new in zip(dut.links, links, strict=True):
+    assert len(links) == len(dut.graph.links) > 0
+    for old, new in zip(dut.graph.links, links, strict=True):
         assert (new.i, new.j, new.kind, new.inliers) == (
             old.i,
             old.j,

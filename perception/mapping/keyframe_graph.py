@@ -1,0 +1,295 @@
+"""Keyframes with their links and planes: a value that grows, and is solved at need."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from scipy.spatial.transform import Rotation
+
+from perception.depth import CameraIntrinsics
+from perception.mapping.config import PoseGraphConfig
+from perception.mapping.graph import Estimate, Graph, Problem, Sighting
+from perception.mapping.keyframe import Keyframe, PlaneSight
+from perception.mapping.links import (
+    Link,
+    LinkKind,
+    link_by_appearance,
+    link_by_geometry,
+)
+from perception.mapping.observability import observed_directions, prior_sigmas
+from perception.mapping.poses import Poses
+from perception.values import FloatArray, FrozenValue
+from perception.wall import upright_rotation
+
+_PLANE_ANGLE_DEG = 5.0
+_PLANE_DISTANCE = 0.03
+"""A plane is a known one if it is no farther off than this."""
+_RECENT = 2
+"""Keyframes back that a new one is always registered to."""
+_CANDIDATES = 12
+"""Older keyframes, the nearest ones, whose overlap is looked at."""
+_GATE = 0.03
+"""A link farther from the arm's relative pose than this, m, is no link."""
+_GATE_DEG = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class KeyframeGraph(FrozenValue):
+    """Keyframes, where they are thought to be, and what ties them.
+
+    Attributes:
+        intrinsics: Of the camera.
+        config: Sigmas and thresholds; never changed.
+        keyframes: In order of time.
+        poses: X_WC of each.
+        links: Between them.
+        sightings: Of planes, by keyframe.
+        planes: (m, 4): unit normal in W and offset, n . p = d.
+    """
+
+    intrinsics: CameraIntrinsics
+    config: PoseGraphConfig
+    keyframes: tuple[Keyframe, ...]
+    poses: tuple[RigidTransform, ...]
+    links: tuple[Link, ...]
+    sightings: tuple[Sighting, ...]
+    planes: FloatArray
+
+    @classmethod
+    def empty(cls, intrinsics: CameraIntrinsics, config: PoseGraphConfig) -> Self:
+        """Makes a graph of nothing.
+
+        Args:
+            intrinsics: Of the camera.
+            config: Sigmas and thresholds.
+
+        Raises:
+            ValueError: A setting is out of bounds.
+        """
+        config.validate()
+        return cls(intrinsics, config, (), (), (), (), np.zeros((0, 4)))
+
+    @property
+    def has_arm(self) -> bool:
+        """Whether the arm gave a pose of any keyframe."""
+        return any(keyframe.X_arm is not None for keyframe in self.keyframes)
+
+    def predicted(self, X_arm: RigidTransform) -> RigidTransform:
+        """Returns X_WC of a picture that the arm places at `X_arm`."""
+        if self.keyframes and (X_before := self.keyframes[-1].X_arm) is not None:
+            return self.poses[-1] @ X_before.inverse() @ X_arm
+        return X_arm
+
+    def is_new(self, X_KC: RigidTransform) -> bool:
+        """Tells whether a picture shows enough that the last keyframe did not.
+
+        Args:
+            X_KC: Where it was taken, seen from that keyframe.
+        """
+        config = self.config
+        if np.linalg.norm(X_KC.translation()) > config.keyframe_distance:
+            return True
+        if angle_deg(X_KC.rotation()) > config.keyframe_angle_deg:
+            return True
+        overlap = self._overlap(self.keyframes[-1], X_KC.inverse())
+        return overlap < 1.0 - config.keyframe_coverage
+
+    def extended(
+        self,
+        keyframe: Keyframe,
+        X_WC: RigidTransform,
+        links: list[Link] | None = None,
+    ) -> Self:
+        """Returns the graph with a keyframe more.
+
+        Args:
+            keyframe: The new one.
+            X_WC: Where it is thought to be.
+            links: To older ones, if they are known already; else they are looked for.
+        """
+        index = len(self.keyframes)
+        grown = self.replace(
+            keyframes=(*self.keyframes, keyframe), poses=(*self.poses, X_WC)
+        )
+        if links is None:
+            links = grown._find_links(index)
+        planes, sightings = list(self.planes), list(self.sightings)
+        for sight in keyframe.planes:
+            number = _associate(sight, X_WC, planes)
+            sightings.append(Sighting(index, number, sight))
+        return grown.replace(
+            links=(*self.links, *links),
+            sightings=tuple(sightings),
+            planes=np.array(planes).reshape(-1, 4),
+        )
+
+    def optimized(self, quick: bool = False) -> tuple[Self, Estimate]:
+        """Returns the graph with poses and planes at their most likely, and more.
+
+        Args:
+            quick: Fewer rounds, for between keyframes.
+        """
+        unknown = RigidTransform()
+        problem = Problem(
+            X_WC=Poses.of(list(self.poses)),
+            X_arm=Poses.of([k.X_arm or unknown for k in self.keyframes]),
+            has_arm=np.array([k.X_arm is not None for k in self.keyframes]),
+            links=list(self.links),
+            sightings=list(self.sightings),
+            planes=self.planes,
+        )
+        estimate = Graph(problem, self.config).optimize(quick)
+        moved = self.replace(
+            poses=tuple(estimate.X_WC.list()), planes=estimate.planes.copy()
+        )
+        return moved, estimate
+
+    def solved(self) -> "Solution":
+        """Returns the last answer: the arm corrected where that is observed."""
+        graph, estimate = self.optimized()
+        observed = np.array(
+            [observed_directions(part, self.config) for part in estimate.observed]
+        )
+        steps = np.zeros((len(self.keyframes), 6))
+        known = [k for k, frame in enumerate(self.keyframes) if frame.X_arm is not None]
+        poses = list(graph.poses)
+        if known:
+            by_arm = [self.keyframes[k].X_arm for k in known]
+            arm = Poses.of([X for X in by_arm if X is not None])
+            sigma = prior_sigmas(self.config)
+            scaled = arm.steps_to(estimate.X_WC[np.array(known)]) / sigma
+            steps[known] = np.einsum("nij,nj->ni", observed[known], scaled) * sigma
+            for k, X_WC in zip(known, arm.moved(steps[known]).list(), strict=True):
+                poses[k] = X_WC
+        return Solution(
+            graph=graph.replace(poses=tuple(poses)),
+            estimate=estimate,
+            observed=observed,
+            corrections=steps,
+        )
+
+    def main_frame(self) -> RigidTransform:
+        """Returns X_WV: z is the most seen plane's normal, y the first camera's up."""
+        R_WC = self.poses[0].rotation().matrix()
+        up_W = -R_WC[:, 1]
+        if not len(self.planes):
+            R = upright_rotation(-R_WC[:, 2], up_W)
+            return RigidTransform(R, self.poses[0].translation())
+        seen = np.zeros(len(self.planes))
+        for sighting in self.sightings:
+            seen[sighting.plane] += sighting.sight.share
+        *normal, offset = self.planes[int(np.argmax(seen))]
+        normal_W = np.array(normal)
+        if abs(normal_W @ up_W) > 0.98:
+            up_W = np.roll(up_W, 1)
+        R = upright_rotation(normal_W, up_W)
+        middle = np.mean([X.translation() for X in self.poses], axis=0)
+        return RigidTransform(R, middle - (normal_W @ middle - offset) * normal_W)
+
+    def _overlap(self, keyframe: Keyframe, X_CK: RigidTransform) -> float:
+        """Returns the share of a keyframe's points that another pose sees."""
+        camera = self.intrinsics
+        points = keyframe.points(camera, step=16)
+        if not points.size:
+            return 0.0
+        x, y, z = X_CK @ points
+        z = np.maximum(z, 1e-3)
+        u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+        inside = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+        return float(inside.mean())
+
+    def _find_links(self, index: int) -> list[Link]:
+        """Registers a keyframe to the last ones and to older ones that it overlaps."""
+        if not self.config.max_links:
+            return []
+        recent = list(range(max(0, index - _RECENT), index))
+        places = Poses.of(list(self.poses))
+        away = np.linalg.norm(
+            places.p[: max(0, index - _RECENT)] - places.p[index], axis=1
+        )
+        older = [
+            (self._overlap(self.keyframes[k], self._relative(index, k)), k)
+            for k in np.argsort(away)[:_CANDIDATES].tolist()
+        ]
+        older = sorted((pair for pair in older if pair[0] > 0.3), reverse=True)
+        # The nearest in the picture, but no two neighbours of each other.
+        chosen: list[int] = []
+        for _, k in older:
+            if all(abs(k - other) > 1 for other in chosen):
+                chosen.append(k)
+        chosen = [*recent, *chosen][: self.config.max_links]
+        found = [self._register(k, index) for k in chosen]
+        return [link for link in found if link is not None]
+
+    def _relative(self, i: int, j: int) -> RigidTransform:
+        return self.poses[i].inverse() @ self.poses[j]
+
+    def _register(self, i: int, j: int) -> Link | None:
+        """Links two keyframes by appearance, or else by geometry."""
+        a, b, guess = self.keyframes[i], self.keyframes[j], self._relative(i, j)
+        link, _ = link_by_appearance(
+            a.features, b.features, self.intrinsics, self.config, (i, j)
+        )
+        if link is None:
+            grids = a.grid(self.intrinsics), b.grid(self.intrinsics)
+            link = link_by_geometry(*grids, guess, self.intrinsics, self.config, (i, j))
+        if link is None:
+            return None
+        off = guess.inverse() @ link.X_ij
+        arm = a.X_arm is not None and b.X_arm is not None
+        if (arm or link.kind is LinkKind.GEOMETRY) and (
+            np.linalg.norm(off.translation()) > _GATE
+            or angle_deg(off.rotation()) > _GATE_DEG
+        ):
+            return None
+        return link
+
+
+@dataclass(frozen=True, eq=False)
+class Solution(FrozenValue):
+    """A graph's last answer.
+
+    Attributes:
+        graph: With its keyframes where they are now thought to be.
+        estimate: What that rests on, and the slow states.
+        observed: (n, 6, 6) projections of the keyframes; see `observed_directions`.
+        corrections: (n, 6) steps from the arm's poses to the keyframes'; 0 without.
+    """
+
+    graph: KeyframeGraph
+    estimate: Estimate
+    observed: FloatArray
+    corrections: FloatArray
+
+    @property
+    def mount(self) -> RigidTransform:
+        """The mount's error: the true camera frame seen from the arm's, X_CCm."""
+        turn, shift = self.estimate.mount[:3], self.estimate.mount[3:]
+        R = Rotation.from_rotvec(turn.copy()).as_matrix()
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), shift)
+
+
+def angle_deg(R: RotationMatrix) -> float:
+    """Returns the angle of a rotation, deg."""
+    cos = (np.trace(R.matrix()) - 1.0) / 2.0
+    return float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0))))
+
+
+def _associate(
+    sight: PlaneSight, X_WC: RigidTransform, planes: list[FloatArray]
+) -> int:
+    """Returns the number of the landmark that a plane is; a new one is appended."""
+    normal = X_WC.rotation() @ sight.normal
+    center = X_WC @ sight.center
+    best, number = np.inf, len(planes)
+    for k, (*n, d) in enumerate(planes):
+        away = abs(float(np.dot(n, center)) - d)
+        cos = float(np.dot(n, normal))
+        if cos > np.cos(np.deg2rad(_PLANE_ANGLE_DEG)) and away < min(
+            best, _PLANE_DISTANCE
+        ):
+            best, number = away, k
+    if number == len(planes):
+        planes.append(np.array([*normal, normal @ center]))
+    return number
