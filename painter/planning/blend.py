@@ -45,6 +45,11 @@ class MovingState(FrozenValue):
         """Makes a state of constant velocity."""
         return cls(np.array(x, dtype=float), np.array(v, dtype=float), np.zeros(len(x)))
 
+    @property
+    def key(self) -> bytes:
+        """What tells it from any other state."""
+        return np.concatenate([self.x, self.v, self.a]).tobytes()
+
 
 def plateaus(
     start: MovingState, end: MovingState, durations: FloatArray
@@ -71,8 +76,38 @@ def plateaus(
     return first, total - first
 
 
+@dataclass(frozen=True, eq=False)
+class Shares(FrozenValue):
+    """Shares of a blend's duration at which blends are looked at.
+
+    Position and rate are linear in the accelerations at the start, on both plateaus and
+    at the end; with what weights depends on the share alone.
+
+    Attributes:
+        s: (m,) shares; before 0 and after 1 a blend goes on at the velocity of that
+            end.
+        place: (m, 4) weights of the accelerations in the position, at duration 1 s.
+        rate: (m, 4) the same in its rate.
+    """
+
+    s: FloatArray
+    place: FloatArray
+    rate: FloatArray
+
+    @classmethod
+    def at(cls, s: FloatArray) -> "Shares":
+        """Makes them for shares (m,)."""
+        inside = np.minimum(np.maximum(s, 0.0), 1.0)
+        piece = np.searchsorted(KNOTS[1:-1], inside, side="right")
+        u = (inside - KNOTS[piece])[:, None]
+        a, jerk, v = _ACCELERATIONS[piece], _JERKS[piece], _RATES[piece]
+        rate = v + u * (a + u * jerk / 2.0)
+        place = _PLACES[piece] + u * (v + u * (a / 2.0 + u * jerk / 6.0))
+        return cls(np.asarray(s), place + (s - inside)[:, None] * rate, rate)
+
+
 def evaluate(
-    start: MovingState, end: MovingState, durations: FloatArray, s: FloatArray
+    start: MovingState, end: MovingState, durations: FloatArray, shares: Shares
 ) -> tuple[FloatArray, FloatArray]:
     """Returns positions and rates of blends, each (k, m, n).
 
@@ -80,29 +115,31 @@ def evaluate(
         start: State at the start.
         end: State at the end.
         durations: (k,) s.
-        s: (m,) shares of the durations; before 0 and after 1 the blend goes on at the
-            velocity of that end.
+        shares: m shares of the durations.
     """
     first, second = plateaus(start, end, durations)
-    ends = np.broadcast_to(start.a, first.shape), np.broadcast_to(end.a, first.shape)
-    a = np.stack([ends[0], first, first, second, second, ends[1]], axis=1)
+    a = np.empty((len(durations), 4, len(start.x)))
+    a[:, 0], a[:, 1], a[:, 2], a[:, 3] = start.a, first, second, end.a
     T = durations[:, None, None]
-    h = np.diff(KNOTS)[None, :, None] * T
-    jerk = np.diff(a, axis=1) / h
-    v = np.empty_like(a)
-    x = np.empty_like(a)
-    v[:, 0], x[:, 0] = start.v, start.x
-    for i in range(len(KNOTS) - 1):
-        u = h[:, i]
-        v[:, i + 1] = v[:, i] + u * (a[:, i] + u * jerk[:, i] / 2.0)
-        x[:, i + 1] = x[:, i] + u * (
-            v[:, i] + u * (a[:, i] / 2.0 + u * jerk[:, i] / 6.0)
-        )
-    inside = np.clip(s, 0.0, 1.0)
-    piece = np.clip(np.searchsorted(KNOTS, inside, side="right") - 1, 0, 4)
-    u = (inside - KNOTS[piece])[None, :, None] * T
-    a_i, j_i, v_i = a[:, piece], jerk[:, piece], v[:, piece]
-    rate = v_i + u * (a_i + u * j_i / 2.0)
-    place = x[:, piece] + u * (v_i + u * (a_i / 2.0 + u * j_i / 6.0))
-    place = place + (s - inside)[None, :, None] * T * rate
+    rate = start.v + T * (shares.rate @ a)
+    place = start.x + T * (shares.s[:, None] * start.v + T * (shares.place @ a))
     return place, rate
+
+
+def _integrals() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Returns accelerations, their slopes, rates and places at the knots.
+
+    Each (6, 4), of a blend of duration 1 s from rest, for unit accelerations at the
+    start, on the two plateaus and at the end; of the slopes there is one a piece.
+    """
+    a = np.eye(4)[[0, 1, 1, 2, 2, 3]]
+    h = np.diff(KNOTS)[:, None]
+    jerk = np.diff(a, axis=0) / h
+    v, x = np.zeros_like(a), np.zeros_like(a)
+    for i, u in enumerate(h):
+        v[i + 1] = v[i] + u * (a[i] + u * jerk[i] / 2.0)
+        x[i + 1] = x[i] + u * (v[i] + u * (a[i] / 2.0 + u * jerk[i] / 6.0))
+    return a, jerk, v, x
+
+
+_ACCELERATIONS, _JERKS, _RATES, _PLACES = _integrals()

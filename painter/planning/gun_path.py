@@ -8,19 +8,26 @@ that the joints allow, found on densely evaluated inverse kinematics instead of 
 left to a time parametriser, which can fail without saying so.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from painter.planning.blend import KNOTS, MovingState, evaluate
+from painter.planning.blend import KNOTS, MovingState, Shares, evaluate
 from painter.planning.joint_motion import SEARCH_SHARE, keeps_limits, shortest
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.surface_frame import SurfaceFrame
 from perception.values import BoolArray, FloatArray, FrozenValue
 
-_SAMPLES = 49  # Of a blend, where its joint rates are looked at.
+# Where a blend's joint rates are looked at, with one sample before and one after, on
+# the passes that the blend joins.
+_STEP = 1.0 / 48
+_SAMPLES = Shares.at(np.linspace(-_STEP, 1.0 + _STEP, 51))
+# Three of these each in the middle of both halves and of all: most blends that are too
+# fast are so there.
+_FEW = Shares.at(_SAMPLES.s[[12, 13, 14, 24, 25, 26, 36, 37, 38]])
 _LONGEST = 8.0  # s, of a blend.
 _FASTEST = 4.0  # m/s, mean speed of a blend that no arm of this size exceeds.
 _DIFFERENCE = 1e-3  # s, half width of the central differences for joint states.
@@ -101,7 +108,8 @@ class ToolBlend(FrozenValue):
     def p_TG(self, time: FloatArray) -> FloatArray:
         """Returns (n, 3) m, in T, at `time` (n,) s."""
         s = np.asarray(time) / self.duration
-        p_TG, _ = evaluate(self.start, self.end, np.array([self.duration]), s)
+        shares = Shares.at(s)
+        p_TG, _ = evaluate(self.start, self.end, np.array([self.duration]), shares)
         p_TG[..., 2] += _hop_height(s, self.hop, self.rise)
         return np.asarray(p_TG[0])
 
@@ -238,6 +246,7 @@ def fastest_tool_blend(
     limits: ArmLimits,
     hop: float = 0.0,
     rise: float = 0.5,
+    longest: float = math.inf,
 ) -> ToolBlend | None:
     """Finds the tool blend of shortest duration that the joints can follow.
 
@@ -248,21 +257,29 @@ def fastest_tool_blend(
         limits: Of the joints, as far as the plan may use them.
         hop: See `ToolBlend`.
         rise: See `ToolBlend`.
+        longest: Blends that take longer are of no use, s.
 
     Returns:
-        The blend, or None if no duration up to 8 s keeps reach and limits.
+        The blend, or None if no duration up to 8 s keeps reach and limits; where none
+        up to `longest` does, perhaps a longer one.
     """
-    step = 1.0 / (_SAMPLES - 1)
-    # One sample before and one after, on the passes that the blend joins.
-    s = np.linspace(-step, 1.0 + step, _SAMPLES + 2)
 
     def allowed(durations: FloatArray) -> BoolArray:
-        p_TGs, _ = evaluate(start, end, durations, s)
-        p_TGs[..., 2] += _hop_height(s, hop, rise)
+        keeps = kept(durations, _FEW, every=3)
+        keeps[keeps] = kept(durations[keeps], _SAMPLES, every=1)
+        return keeps
+
+    def kept(durations: FloatArray, samples: Shares, *, every: int) -> BoolArray:
+        """Looks at samples; at every third one if they come in threes."""
+        p_TGs, _ = evaluate(start, end, durations, samples)
+        p_TGs[..., 2] += _hop_height(samples.s, hop, rise)
         q = gun.solve(p_TGs)
-        dt = (durations * step)[:, None, None]
-        v = (q[:, 2:] - q[:, :-2]) / (2.0 * dt)
-        a = (q[:, 2:] - 2.0 * q[:, 1:-1] + q[:, :-2]) / dt**2
+        before, at, after = (
+            q[:, first : first + q.shape[1] - 2 : every] for first in range(3)
+        )
+        dt = (durations * _STEP)[:, None, None]
+        v = (after - before) / (2.0 * dt)
+        a = (after - 2.0 * at + before) / dt**2
         with np.errstate(invalid="ignore"):
             keeps = np.abs(v) <= SEARCH_SHARE * limits.v_max
             keeps &= np.abs(a) <= SEARCH_SHARE * limits.a_max
@@ -274,6 +291,7 @@ def fastest_tool_blend(
     if speed > 0.0 and travel > 0.0:
         # Going straight on at constant speed needs no acceleration of the gun at all.
         durations = np.sort(np.append(durations, travel / speed))
+    durations = durations[: np.searchsorted(durations, longest) + 1]
 
     def certain(duration: float) -> bool:
         blend = ToolBlend(start, end, duration, hop, rise)

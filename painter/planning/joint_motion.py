@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from painter.planning.blend import KNOTS, MovingState, evaluate, plateaus
+from painter.planning.blend import KNOTS, MovingState, Shares, evaluate, plateaus
 from painter.planning.kinematics import ArmLimits
 from painter.planning.spray_path import Motion
 from perception.values import BoolArray, FloatArray, FrozenValue
@@ -21,7 +21,7 @@ _SHORTEST_MOVE = 0.05  # s; a move of no length still lasts a few samples.
 _TRAVEL_RAMP = 0.2
 _SHORTEST_CRUISE = 1e-6  # s; a shorter one is rounding.
 _LONGEST_BLEND = 8.0  # s
-_SAMPLES = 33  # Of a blend, where its rates are looked at.
+_SAMPLES = Shares.at(np.linspace(0.0, 1.0, 33))  # Where a blend's rates are looked at.
 # The peak between two samples may exceed what is seen at them a little.
 SEARCH_SHARE = 0.98
 _DENSE_STEP = 0.004  # s, of the second look at a move that was found.
@@ -67,8 +67,8 @@ class JointBlend(FrozenValue):
 
     def q(self, time: FloatArray) -> FloatArray:
         """See `Segment.q`."""
-        s = np.asarray(time) / self.duration
-        q, _ = evaluate(self.start, self.end, np.array([self.duration]), s)
+        shares = Shares.at(np.asarray(time) / self.duration)
+        q, _ = evaluate(self.start, self.end, np.array([self.duration]), shares)
         return np.asarray(q[0])
 
 
@@ -183,14 +183,13 @@ def fastest_joint_blend(
     Returns:
         The blend, or None if no duration up to 8 s keeps them.
     """
-    s = np.linspace(0.0, 1.0, _SAMPLES)
 
     def allowed(durations: FloatArray) -> BoolArray:
         first, second = plateaus(start, end, durations)
         peak = np.maximum(np.abs(first), np.abs(second))
         keeps = np.asarray((peak <= SEARCH_SHARE * limits.a_max).all(axis=1))
         if keeps.any():
-            q, v = evaluate(start, end, durations[keeps], s)
+            q, v = evaluate(start, end, durations[keeps], _SAMPLES)
             slow = (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
             keeps[keeps] = slow & limits.contains(q).all(axis=1)
         return keeps

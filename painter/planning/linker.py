@@ -1,7 +1,9 @@
 """Gun-off moves between strokes, from rest and to rest, each checked for clearance."""
 
 import itertools
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,6 +50,11 @@ class Linker(FrozenValue):
     limits: ArmLimits
     space: ClearSpace
     q_home: FloatArray
+    # Moves that were looked for, or why there are none: a program that has to be linked
+    # once more asks for most of them again.
+    _known: dict[tuple[str, bytes, bytes], list[Segment] | PainterError] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def between(self, start: MovingState, end: MovingState) -> list[Segment]:
         """Joins two moving states: by a blend, a hop, or a detour through rest.
@@ -63,36 +70,48 @@ class Linker(FrozenValue):
             CollisionError: Every way comes too near to something.
             ReachError: Every way leaves the arm's reach or joint limits.
         """
-        for hop in self._hops(min(start.x[2], end.x[2])):
-            ways = self._ways(start, end, hop)
-            for way in sorted(ways, key=lambda segment: segment.duration):
-                if self.clear(way):
+
+        def look() -> list[Segment]:
+            for hop in self._hops(min(start.x[2], end.x[2])):
+                way = self._way(start, end, hop)
+                if way is not None:
                     return [way]
-        leave = self.to_rest(start)
-        return [leave, *self.from_rest(end_q(leave), end)]
+            leave = self.to_rest(start)
+            return [leave, *self.from_rest(end_q(leave), end)]
+
+        return self._once(("between", start.key, end.key), look)
 
     def from_rest(self, q: FloatArray, end: MovingState) -> list[Segment]:
         """Goes from rest at `q` (5,), rad, to `end`; raises as `between` does."""
-        failure: PainterError | None = None
-        for anchor in _anchors(end, -1.0):
-            try:
-                arrive = self._blend(anchor, end)
-                return [*self.transit(q, start_q(arrive)), arrive]
-            except (CollisionError, ReachError) as error:
-                failure = failure or error
-        assert failure is not None
-        raise failure
+
+        def look() -> list[Segment]:
+            failure: PainterError | None = None
+            for anchor in _anchors(end, -1.0):
+                try:
+                    arrive = self._blend(anchor, end)
+                    return [*self.transit(q, start_q(arrive)), arrive]
+                except (CollisionError, ReachError) as error:
+                    failure = failure or error
+            assert failure is not None
+            raise failure
+
+        return self._once(("from rest", q.tobytes(), end.key), look)
 
     def to_rest(self, start: MovingState) -> Segment:
         """Goes from `start` to rest nearby; raises as `between` does."""
-        failure: PainterError | None = None
-        for anchor in _anchors(start, 1.0):
-            try:
-                return self._blend(start, anchor)
-            except (CollisionError, ReachError) as error:
-                failure = failure or error
-        assert failure is not None
-        raise failure
+
+        def look() -> list[Segment]:
+            failure: PainterError | None = None
+            for anchor in _anchors(start, 1.0):
+                try:
+                    return [self._blend(start, anchor)]
+                except (CollisionError, ReachError) as error:
+                    failure = failure or error
+            assert failure is not None
+            raise failure
+
+        (move,) = self._once(("to rest", start.key, b""), look)
+        return move
 
     def transit(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
         """Goes from rest to rest: directly, or over poses where there is more room.
@@ -158,6 +177,20 @@ class Linker(FrozenValue):
         time = sample_times(segment)
         self.space.require(segment.q(time), time, what=what)
 
+    def _once(
+        self, what: tuple[str, bytes, bytes], look: Callable[[], list[Segment]]
+    ) -> list[Segment]:
+        """Returns or raises what `look` does, which is asked once."""
+        if what not in self._known:
+            try:
+                self._known[what] = look()
+            except (CollisionError, ReachError) as error:
+                self._known[what] = error
+        known = self._known[what]
+        if isinstance(known, PainterError):
+            raise known
+        return known
+
     def _drawn_over(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
         """Returns moves of the square gun from rest to rest over a hop."""
         _, p_WGs = self.gun.kinematics.gun_poses(np.stack([q0, q1]))
@@ -165,28 +198,50 @@ class Linker(FrozenValue):
         if not np.allclose(self.gun.solve(p_TGs), [q0, q1], atol=_SQUARE):
             return []
         start, end = (MovingState.at_rest(p_TG) for p_TG in p_TGs)
-        moves = [self._ways(start, end, hop) for hop in _DRAWN_OVER]
-        return [move for ways in moves for move in ways]
+        moves = [
+            self._tool_move(start, end, hop, rise)
+            for hop in _DRAWN_OVER
+            for rise in _RISES
+        ]
+        return [move for move in moves if move is not None]
 
-    def _ways(self, start: MovingState, end: MovingState, hop: float) -> list[Segment]:
-        """Returns blends from start to end: of the nozzle, and without hop of joints.
+    def _way(self, start: MovingState, end: MovingState, hop: float) -> Segment | None:
+        """Returns the quickest clear blend: of the nozzle, or without hop of joints.
 
         A joint blend turns faster and does not run out of reach at a tile's corners; a
         nozzle's blend keeps straight between strokes of one line.
         """
-        ways: list[Segment] = []
-        for rise in _RISES if hop else _RISES[:1]:
-            blend = fastest_tool_blend(
-                start, end, gun=self.gun, limits=self.limits, hop=hop, rise=rise
-            )
-            if blend is not None:
-                ways.append(ToolMove(blend, self.gun))
+        best: Segment | None = None
         if not hop:
             states = self.gun.joint_state(start), self.gun.joint_state(end)
             turn = fastest_joint_blend(*states, self.limits)
-            if turn is not None:
-                ways.append(turn)
-        return ways
+            if turn is not None and self.clear(turn):
+                best = turn
+        for rise in _RISES if hop else _RISES[:1]:
+            longest = math.inf if best is None else best.duration
+            move = self._tool_move(start, end, hop, rise, longest)
+            if move is not None and move.duration < longest and self.clear(move):
+                best = move
+        return best
+
+    def _tool_move(
+        self,
+        start: MovingState,
+        end: MovingState,
+        hop: float,
+        rise: float,
+        longest: float = math.inf,
+    ) -> ToolMove | None:
+        blend = fastest_tool_blend(
+            start,
+            end,
+            gun=self.gun,
+            limits=self.limits,
+            hop=hop,
+            rise=rise,
+            longest=longest,
+        )
+        return None if blend is None else ToolMove(blend, self.gun)
 
     def _blend(self, start: MovingState, end: MovingState) -> Segment:
         what = f"move from {_place(start)} to {_place(end)}"

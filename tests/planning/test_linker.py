@@ -5,8 +5,8 @@ import pytest
 
 from painter.errors import CollisionError
 from painter.planning.blend import MovingState
-from painter.planning.gun_path import ToolMove
-from painter.planning.joint_motion import rest_to_rest
+from painter.planning.gun_path import ToolMove, fastest_tool_blend
+from painter.planning.joint_motion import fastest_joint_blend, rest_to_rest
 from painter.planning.linker import end_q, start_q
 from painter.planning.obstacles import ObstacleBox
 
@@ -69,6 +69,34 @@ def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
     q = turn.q(np.linspace(0.0, turn.duration, 100))
     np.testing.assert_allclose(q[:, 1:4].sum(axis=1), 0.0, atol=1e-6)
     np.testing.assert_allclose(q[:, 0] + q[:, 4], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("box", [None, TALL])
+def test_the_quickest_clear_move_is_taken(robot, box):
+    """All that are tried, each found by itself, in the order of their durations."""
+    linker = robot.linker(*([] if box is None else [box]))
+    hops = [0.0] if box is None else [0.0, 0.10]
+    ways = ((0.87, -1.0), (1.0, 1.0), (1.07, 1.0), (1.16, -1.0))
+    for x, way in ways if box is None else ((1.0, 1.0), (1.05, 1.0)):
+        start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
+        end = MovingState.steady(np.array([x, 1.25, 0.3]), way * UP)
+        by_hop = []
+        for hop in hops:
+            blends = [
+                fastest_tool_blend(
+                    start, end, gun=linker.gun, limits=linker.limits, hop=hop, rise=rise
+                )
+                for rise in ((0.5, 0.35, 0.25, 0.15) if hop else (0.5,))
+            ]
+            moves = [ToolMove(blend, linker.gun) for blend in blends if blend]
+            if not hop:
+                states = linker.gun.joint_state(start), linker.gun.joint_state(end)
+                moves.append(fastest_joint_blend(*states, linker.limits))
+            by_hop.append([move.duration for move in moves if linker.clear(move)])
+        durations = next(durations for durations in by_hop if durations)
+        for _ in range(2):  # Asked again it is the same.
+            (move,) = linker.between(start, end)
+            assert move.duration == min(durations)
 
 
 def test_transit_goes_round_what_blocks_the_straight_way(robot):
