@@ -63,9 +63,12 @@ _Step = tuple[str, float]  # A number of a span, and by how much it varies.
 class _Laid:
     """A span with the film that it leaves, and the steps of it that did not help."""
 
-    def __init__(self, span: Span, window: _Window, film: FloatArray) -> None:
-        """Takes a span and its film on the cells that it reaches."""
+    def __init__(
+        self, span: Span, window: _Window, film: FloatArray, has_room: bool
+    ) -> None:
+        """Takes a span, its film on the cells that it reaches, and if it has room."""
         self.span, self.window, self.film = span, window, film
+        self.has_room = has_room
         # At which change of the film steps were last tried, and on which cells; None:
         # they cannot be made.
         self.failed: dict[_Step, tuple[int, _Window] | None] = {}
@@ -133,7 +136,7 @@ class FilmFit:
 
     def add(self, span: Span) -> None:
         """Adds a span and its film."""
-        laid = self._lay(span)
+        laid = self._lay(span, self._has_room(span))
         self._laid.append(laid)
         self.film[laid.window] += laid.film
 
@@ -173,9 +176,9 @@ class FilmFit:
                     break  # The step back would only undo the last one.
         return helped
 
-    def _varied(self, span: Span, name: str, step: float) -> Span | None:
-        """Returns the span with one number varied, or None if it cannot be."""
-        raster = self._raster
+    def _varied(self, laid: _Laid, name: str, step: float) -> Span | None:
+        """Returns a span with one number varied, or None if it cannot be."""
+        raster, span = self._raster, laid.span
         trial = span._replace(**{name: getattr(span, name) + step})
         if name == "lean":
             # About the middle.
@@ -192,7 +195,8 @@ class FilmFit:
             return None
         if trial.high - trial.low < raster.min_stroke:
             return None
-        return trial if self._has_room(trial) else None
+        has_room = laid.has_room if name == "flow" else self._has_room(trial)
+        return trial if has_room else None
 
     def _has_room(self, span: Span) -> bool:
         site = self._model.site
@@ -219,7 +223,7 @@ class FilmFit:
             last = laid.failed[step]
             if last is None or self._unchanged_since(*last):
                 return False
-        span, trial = laid.span, self._varied(laid.span, *step)
+        span, trial = laid.span, self._varied(laid, *step)
         if trial is None:
             laid.failed[step] = None
             return False
@@ -244,7 +248,7 @@ class FilmFit:
             laid.failed[step] = (self._changes, changed)
             return False
         self._change(changed, film, costs)
-        laid = self._laid[index] = self._lay(trial)
+        laid = self._laid[index] = self._lay(trial, has_room=True)
         # The step back would only undo this one.
         laid.failed[name, -size] = (self._changes, changed)
         return True
@@ -280,9 +284,9 @@ class FilmFit:
         site = self._model.site
         return self._cost(film, site.wanted[window], site.clean[window])
 
-    def _lay(self, span: Span) -> _Laid:
+    def _lay(self, span: Span, has_room: bool) -> _Laid:
         line, window = self._reached(span)
-        return _Laid(span, window, self._film(span, line, window))
+        return _Laid(span, window, self._film(span, line, window), has_room)
 
     def _reached(self, span: Span) -> tuple[Line, _Window]:
         """Returns a span's line and the cells that its film reaches."""

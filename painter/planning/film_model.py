@@ -23,7 +23,7 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 # Beyond the tile's edges by so much the film is looked at, m: more than half a fan.
 MARGIN = 0.14
 _TABLE = np.linspace(-1.0, 1.0, 2001)
-_BLOCK = 16  # Rows of a leaning line that are made together.
+_BLOCK = 16  # Rows of a line that are made together.
 
 
 def margin_cells(cell: float) -> int:
@@ -168,8 +168,7 @@ class FilmModel:
             rows: Those of the site that are looked at; None = all.
         """
         first, stop = 0, len(self.site.y)
-        if rows is not None and lean != 0.0:
-            # Each row of it is another; upright most are alike, and all soon made.
+        if rows is not None:
             first = rows.start // _BLOCK * _BLOCK
             stop = min(-(-rows.stop // _BLOCK) * _BLOCK, stop)
         key = (round(x_line, 4), round(standoff, 4), round(lean, 4), first, stop)
@@ -225,8 +224,9 @@ class FilmModel:
         if lean == 0.0:
             column = math.floor(x_line / cell) + site.border
             first = min(max(column - reach, 0), count - 1)
-            new = site.steps[:, first : max(column + reach, 0) + 1].any(axis=1)
-            rows, back = np.flatnonzero(new), np.cumsum(new) - 1
+            new = site.steps[low:high, first : max(column + reach, 0) + 1].any(axis=1)
+            new[0] = True
+            rows, back = rows[new], np.cumsum(new) - 1
         axis = (x_line + lean * site.y[rows])[:, None]
         middle = np.floor(axis / cell).astype(int) + site.border
         columns = middle + np.arange(-reach, reach + 1)

@@ -165,13 +165,13 @@ class PlainFit(FilmFit):
 
     def _try(self, index, step):
         spans = list(self.spans)
-        trial = self._varied(spans[index], *step)
+        trial = self._varied(self._laid[index], *step)
         if trial is None:
             return False
         varied = [*spans[:index], trial, *spans[index + 1 :]]
         if self.worth(spans) - self.worth(varied) < 1e-6:
             return False
-        self._laid[index] = self._lay(trial)
+        self._laid[index] = self._lay(trial, has_room=True)
         return True
 
     def _drop(self):
