@@ -21,6 +21,8 @@ DEPTH_UNITS_PER_M = 5000.0
 """Source: TUM RGB-D benchmark, "File formats": 5000 units of depth are a metre."""
 MAX_TIME_DIFFERENCE = 0.02
 """Colour, depth and pose belong together within this, s; TUM's `associate.py`."""
+MAX_POSE_GAP = 0.1
+"""Poses no farther apart than this are interpolated, s."""
 CAMERA_FILE = "camera.json"
 TRUTH_FILE = "groundtruth.txt"
 ARM_FILE = "arm.txt"
@@ -231,6 +233,11 @@ def _parse_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
     for name, value in (sizes | lengths).items():
         if not (np.isfinite(value) and value > 0):
             raise CloudReadError(f"{path}: {name} must be > 0, got {value!r}.")
+    for name, side in (("cx", "width"), ("cy", "height")):
+        if lengths[name] >= sizes[side]:
+            raise CloudReadError(
+                f"{path}: {name} must be < {side} {sizes[side]}, got {lengths[name]!r}."
+            )
     camera = CameraIntrinsics(**lengths, width=sizes["width"], height=sizes["height"])
     return camera, unit_mm
 
@@ -254,19 +261,38 @@ def _tum_entries(
     color_times, colors = _read_list(folder / "rgb.txt")
     if not color_times.size:
         return []
-    pose_times = np.array([time for time, _ in poses or []])
+    poses = sorted(poses or [], key=lambda pose: pose[0])
+    pose_times = np.array([time for time, _ in poses])
     entries = []
     for time, depth in zip(depth_times, depths, strict=True):
         nearest = int(np.argmin(np.abs(color_times - time)))
         if abs(color_times[nearest] - time) > MAX_TIME_DIFFERENCE:
             continue
-        X_WC = None
-        if poses:
-            at = int(np.argmin(np.abs(pose_times - time)))
-            if abs(pose_times[at] - time) <= MAX_TIME_DIFFERENCE:
-                X_WC = poses[at][1]
+        X_WC = None if not poses else _pose_at(float(time), pose_times, poses)
         entries.append(FramePaths(float(time), depth, colors[nearest], X_WC))
     return sorted(entries, key=lambda entry: entry.time)
+
+
+def _pose_at(
+    time: float, times: FloatArray, poses: list[tuple[float, RigidTransform]]
+) -> RigidTransform | None:
+    """Returns the pose at a time: between two near ones, or at one that is very near.
+
+    At 0.2 m/s the camera moves by 4 mm in MAX_TIME_DIFFERENCE.
+    """
+    after = int(np.searchsorted(times, time))
+    if 0 < after < len(times) and times[after] - times[after - 1] <= MAX_POSE_GAP:
+        (t0, X0), (t1, X1) = poses[after - 1], poses[after]
+        share = (time - t0) / (t1 - t0)
+        R01 = (X0.rotation().inverse() @ X1.rotation()).matrix()
+        turn = share * Rotation.from_matrix(R01).as_rotvec()
+        R = X0.rotation().matrix() @ Rotation.from_rotvec(turn).as_matrix()
+        p = (1.0 - share) * X0.translation() + share * X1.translation()
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
+    nearest = int(np.argmin(np.abs(times - time)))
+    if abs(times[nearest] - time) <= MAX_TIME_DIFFERENCE:
+        return poses[nearest][1]
+    return None
 
 
 def _numbered_entries(folder: Path, use_poses: bool) -> list[FramePaths]:

@@ -20,10 +20,16 @@ from perception.mapping.keyframe import (
     make_keyframe,
 )
 from perception.mapping.keyframe_graph import KeyframeGraph, Solution
-from perception.mapping.links import Link, link_by_appearance
+from perception.mapping.links import Link, LinkKind, link_by_appearance
 
 _PATIENCE = 10
 """Frames that may be lost before a map without poses is given up."""
+_FAR = 0.05
+"""Links at least so long tell the camera's scale, m,"""
+_FEWEST = 10
+"""if there are so many,"""
+_SCALE = 0.03
+"""and pictures that move by another share than this are of another camera."""
 
 
 class NoMapError(PerceptionError):
@@ -110,6 +116,7 @@ class Mapper:
         """
         if not self.graph.keyframes or self.outcomes[Outcome.LOST] > len(self.placed):
             raise self._no_map()
+        self._check_scale()
         start = time.process_time()
         solution = self.graph.solved()
         self.graph = graph = solution.graph
@@ -206,6 +213,25 @@ class Mapper:
         if frame.X_WC is None:
             return None if self.graph.keyframes else RigidTransform()
         return self.graph.predicted(frame.X_WC)
+
+    def _check_scale(self) -> None:
+        """Raises if pictures and arm do not move alike; a bare wall cannot tell."""
+        ratios = []
+        for link in self.graph.links:
+            a, b = (self.graph.keyframes[k].X_arm for k in (link.i, link.j))
+            if link.kind is not LinkKind.APPEARANCE or a is None or b is None:
+                continue
+            by_arm = np.linalg.norm((a.inverse() @ b).translation())
+            if by_arm > _FAR:
+                ratios.append(np.linalg.norm(link.X_ij.translation()) / by_arm)
+        if len(ratios) < _FEWEST:
+            return
+        ratio = float(np.median(ratios))
+        if abs(ratio - 1.0) > _SCALE:
+            raise NoMapError(
+                f"the pictures move {ratio:.3f} times as far as the arm, 1 +- {_SCALE} "
+                "is allowed: the camera's focal length or depth unit is wrong."
+            )
 
     def _no_map(self) -> NoMapError:
         lost, total = self.outcomes[Outcome.LOST], sum(self.outcomes.values())

@@ -45,6 +45,10 @@ class WallKind(enum.StrEnum):
     BLANK = "blank"
 
 
+_SOLID = (WallKind.PAINTED, WallKind.WINDOW)
+"""Walls with a recess and boxes."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SequenceConfig:
     """One sequence.
@@ -82,6 +86,13 @@ class SequenceConfig:
     stereo: StereoConfig = field(default_factory=StereoConfig)
 
 
+def outlines(wall: WallKind) -> list[tuple[float, float, float, float]]:
+    """Returns where a wall has steps: x and y from, x and y to, in T, m."""
+    if wall not in _SOLID:
+        return []
+    return [(part[0], part[1], part[2], part[3]) for part in (_RECESS, *_BOXES)]
+
+
 def render_sequence(
     config: SequenceConfig, seed: int
 ) -> Iterator[tuple[Frame, RigidTransform]]:
@@ -97,7 +108,7 @@ def render_sequence(
     intrinsics = CameraIntrinsics.from_stereo(config.stereo)
     model = StereoModel(config.stereo, seed)
     picture = _wall_picture(config.wall, np.random.default_rng([seed, 1]))
-    solid = config.wall in (WallKind.PAINTED, WallKind.WINDOW)
+    solid = config.wall in _SOLID
     times, truth, arm = _poses(config, np.random.default_rng([seed, 2]))
     for number, (time, X_WC, X_arm) in enumerate(zip(times, truth, arm, strict=True)):
         rng = np.random.default_rng([seed, 3, number])

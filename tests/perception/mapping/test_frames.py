@@ -43,6 +43,22 @@ def test_a_recording_comes_back_as_it_was(tmp_path):
     )
 
 
+def test_a_pose_is_that_of_the_pictures_time(tmp_path):
+    write_recording(tmp_path, CAMERA, [(make_frame(0.25), pose(0))])
+    # A quarter of the way from one to the other, both in place and in angle.
+    ends = [
+        RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, 0.0, 0.0])
+        for yaw, x in ((0.0, 1.0), (0.2, 1.04))
+    ]
+    write_poses(tmp_path / "arm.txt", zip((0.23, 0.31), ends, strict=True))
+    (entry,) = open_recording(tmp_path).entries
+    expected = RigidTransform(RollPitchYaw(0.0, 0.0, 0.05), [1.01, 0.0, 0.0])
+    assert entry.X_WC.IsNearlyEqualTo(expected, 1e-8)
+    # Too far apart to know what was between, and too far off to be the same.
+    write_poses(tmp_path / "arm.txt", zip((0.2, 0.31), ends, strict=True))
+    assert open_recording(tmp_path).entries[0].X_WC is None
+
+
 def test_numbered_files_are_read_with_their_poses(tmp_path):
     camera = {"width": 64, "height": 48, "fx": 50, "fy": 51, "cx": 31.5, "cy": 23.5}
     (tmp_path / "intrinsics.json").write_text(json.dumps(camera))
@@ -71,6 +87,11 @@ def test_poses_that_are_none_are_refused_by_line(tmp_path):
     [
         ("camera.json", None, "no camera.json"),
         ("camera.json", '{"width": 64}', "no camera"),
+        (
+            "camera.json",
+            '{"width": 64, "height": 48, "fx": 50, "fy": 50, "cx": 319.5, "cy": 24}',
+            "cx must be < width 64, got 319.5",
+        ),
         ("depth.txt", "0.0\n", "lines of time and file"),
         ("rgb.txt", "", "no frames"),
     ],

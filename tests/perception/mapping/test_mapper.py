@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
@@ -90,6 +92,31 @@ def test_unusable_frames_are_counted(blank_scan, intrinsics):
     assert dut.add(small) is Outcome.WRONG_SIZE
     assert dut.add(later) in (Outcome.KEYFRAME, Outcome.TRACKED)
     assert sum(dut.outcomes.values()) == 5
+
+
+def test_dropped_late_and_repeated_frames_spoil_nothing(blank, blank_scan, intrinsics):
+    dut = Mapper(intrinsics, MapperConfig())
+    frames = [frame for frame, _ in blank_scan]
+    kept = frames[:6] + frames[10:]
+    for index, frame in enumerate(kept):
+        dut.add(frame)
+        dut.add(frame)
+        if index > 3:
+            dut.add(kept[index - 3])
+    result = dut.finish()
+    assert len(result.poses) == len(kept)
+    assert dut.outcomes[Outcome.OUT_OF_ORDER] == len(kept) + len(kept) - 4
+    *normal, _ = result.solution.graph.planes[0]
+    np.testing.assert_allclose(normal, [0.0, 0.0, 1.0], atol=0.004)
+
+
+def test_a_camera_of_another_focal_length_is_refused(textured_scan, intrinsics):
+    wrong = dataclasses.replace(
+        intrinsics, fx=1.1 * intrinsics.fx, fy=1.1 * intrinsics.fy
+    )
+    # Seen through a longer lens the wall is smaller and moves less.
+    with pytest.raises(NoMapError, match=r"move 0\.9\d* times .* focal length"):
+        mapped(textured_scan, wrong)
 
 
 def test_no_frame_is_no_map(intrinsics):
