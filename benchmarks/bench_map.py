@@ -167,9 +167,10 @@ def print_surface(result: MappingResult, wall: WallKind) -> None:
         f"{np.count_nonzero(doubled & part)} of {np.count_nonzero(part)}"
         for part in (~step, step)
     )
+    bent = 1e3 * np.ptp(bend[within])
     print(
         f"  wall at 1 cm cells: 5-95 % {1e3 * thick:.2f} mm; doubled 2 cm cells "
-        f"{flat}, at steps {edge}; bending over 2 m {1e3 * np.ptp(bend[within]):.2f} mm; "
+        f"{flat}, at steps {edge}; bending over 2 m {bent:.2f} mm; "
         f"carved {fused.carved}"
     )
 
