@@ -127,9 +127,10 @@ def fitted_strokes(
             last is not None
             and abs(span.x - last.x) < _SAME_LINE
             and span[3:] == last[3:]
-            and span.low - last.high < gap
+            and max(span.low, last.low) - min(span.high, last.high) < gap
         ):
-            joined[-1] = last._replace(high=max(last.high, span.high))
+            low, high = min(last.low, span.low), max(last.high, span.high)
+            joined[-1] = last._replace(low=low, high=high)
         else:
             joined.append(span)
     across = [round(span.x_at(0.5 * (span.low + span.high)), 3) for span in joined]

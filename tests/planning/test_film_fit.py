@@ -12,7 +12,7 @@ from painter.planning.deposition import half_axes, mean_film, predicted_film
 from painter.planning.film_cost import FilmCost, stroke_cost
 from painter.planning.film_fit import FilmFit, Span
 from painter.planning.film_model import FilmModel, Site
-from painter.planning.raster import plan_strokes, raster_film
+from painter.planning.raster import fitted_strokes, plan_strokes, raster_film
 from painter.planning.spray_cone import SprayCone, SpraySurface
 from painter.planning.spray_path import Stroke
 
@@ -279,3 +279,15 @@ def test_nominal_film_is_flow_over_speed_and_pitch():
     assert raster_film(2.0, tip=TIP, raster=RASTER) == mean_film(
         TIP, speed=0.6, pitch=2.0 / 14
     )
+
+
+def test_spans_of_nearly_one_line_are_joined_only_where_they_meet():
+    """A span that lies left of and above another is not one with it."""
+    upper = Span(0.088, 1.83, 2.01, 0.315, 1.0)
+    lower = Span(0.089, 0.00, 1.62, 0.315, 1.0)
+    apart = fitted_strokes([upper, lower], tip=TIP, raster=RASTER)
+    assert sum(s.length for s in apart) == pytest.approx(0.18 + 1.62)
+    (joined,) = fitted_strokes(
+        [upper, lower._replace(high=1.825)], tip=TIP, raster=RASTER
+    )
+    assert joined.length == pytest.approx(2.01)
