@@ -91,6 +91,7 @@ HARDWARE_MODULES = {
     "painter.systems.canopen_arm",
     "painter.systems.canopen_gun",
     "perception.bag_io",
+    "perception.mapping.bag",
 }
 
 

@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -17,7 +18,9 @@ from painter.cli.common import (
     progress,
 )
 from painter.errors import InputError
+from perception.bag_io import BAG_SUFFIXES
 from perception.depth import CameraIntrinsics
+from perception.mapping.bag import unpack_bag
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import Frame, open_recording, write_poses
 from perception.mapping.fusion import write_map, write_mesh
@@ -34,8 +37,8 @@ def map(
         Path,
         typer.Argument(
             metavar="FRAMES",
-            help="Folder in TUM RGB-D form or of numbered frames, or a map file (.db) "
-            "whose keyframes are mapped again.",
+            help="Folder in TUM RGB-D form or of numbered frames, a RealSense "
+            "recording (.bag, .db3), or a map file (.db) whose keyframes are mapped again.",
         ),
     ],
     out: OutOption,
@@ -139,6 +142,10 @@ def _source(
     stack: ExitStack, path: Path, poses: Path | None, use_poses: bool
 ) -> tuple[CameraIntrinsics, Iterable[Frame], int]:
     """Returns the camera, the frames and their number."""
+    if path.suffix in BAG_SUFFIXES:
+        folder = Path(stack.enter_context(TemporaryDirectory()))
+        unpack_bag(path, folder)
+        path = folder
     if path.suffix != MAP_SUFFIX:
         recording = open_recording(path, poses=poses, use_poses=use_poses)
         return recording.intrinsics, recording.frames(), len(recording.entries)
