@@ -38,7 +38,7 @@ def map(
         typer.Argument(
             metavar="FRAMES",
             help="Folder in TUM RGB-D form or of numbered frames, a RealSense "
-            "recording (.bag, .db3), or a map file (.db) whose keyframes are mapped again.",
+            "recording (.bag, .db3), or a map file (.db) that is mapped again.",
         ),
     ],
     out: OutOption,
