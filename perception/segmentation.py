@@ -133,10 +133,13 @@ def segment_wall(
         found.planes[number], X_WT_expected, **size, total=found.kept_count
     )
     coarse = segment_tile(found, wall, number + 1, **size, config=config).segmentation
-    used = np.flatnonzero(np.all(np.isfinite(p_WQs), axis=0))[found.kept]
+    # A map has told by its counts what is real. On its even grid the statistical filter
+    # takes the rows along edges for outliers, which say where the edges are.
+    real = found.kept if counts is None else np.ones_like(found.kept)
+    used = np.flatnonzero(finite_points(p_WQs))[real]
     return refine_segmentation(
         coarse,
-        wall.X_WT.inverse() @ found.p_WQs.compress(found.kept, axis=1),
+        wall.X_WT.inverse() @ found.p_WQs.compress(real, axis=1),
         counts=None if counts is None else counts[used],
         variances=None if variances is None else variances[used],
         p_TCs=None if p_WCs is None else wall.X_WT.inverse() @ p_WCs,
