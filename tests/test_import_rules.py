@@ -17,7 +17,13 @@ IN_TREE = {
     "perception": {"perception"},
     "painter": set(),
     "painter.resources": {"painter_models"},
-    "painter.camera": {"painter.camera", "painter.errors", "perception"},
+    "painter.timebase": set(),
+    "painter.camera": {
+        "painter.camera",
+        "painter.errors",
+        "painter.timebase",
+        "perception",
+    },
     "painter.config": {
         "painter.camera.config",
         "painter.errors",
@@ -27,7 +33,7 @@ IN_TREE = {
         "perception.mapping.config",
     },
     "painter.planning": {"painter.errors", "painter.planning", "perception"},
-    "painter.canopen": {"painter.canopen", "painter.errors"},
+    "painter.canopen": {"painter.canopen", "painter.errors", "painter.timebase"},
     "painter.scene": {
         "painter.errors",
         "painter.resources",

@@ -8,12 +8,12 @@ import contextlib
 import select
 import socket
 import struct
-import time
 from pathlib import Path
 
 import numpy as np
 
 from painter.camera.frames import CameraError, ColorArray, DepthArray
+from painter.timebase import TimeBase
 
 _HEAD = struct.Struct("<4sdHHB")
 _MAGIC = b"pic1"
@@ -48,7 +48,7 @@ class FrameServer:
         Args:
             depth_mm: (H, W) uint16, mm.
             color: (H, W, 3) RGB, or None.
-            when: When it was taken, by `time.monotonic()`, s.
+            when: When it was taken, by the run's clock, s.
         """
         while select.select([self._listener], [], [], 0.0)[0]:
             client, _ = self._listener.accept()
@@ -82,13 +82,17 @@ class FrameLink:
     that what took long to render comes no later than the rest.
     """
 
-    def __init__(self, path: str, *, latency: float) -> None:
+    def __init__(
+        self, path: str, *, latency: float, clock: TimeBase | None = None
+    ) -> None:
         """Names the server; it is connected to when a picture is asked for.
 
         Args:
             path: Of the server's socket.
             latency: Age at which pictures are handed on, s.
+            clock: The run's, by which pictures are stamped; None = the machine's.
         """
+        self._clock = clock or TimeBase()
         self._path = path
         self._latency = latency
         self._socket: socket.socket | None = None
@@ -113,7 +117,7 @@ class FrameLink:
             self.close()
             text = error.strerror or str(error)
             raise CameraError(f"camera socket {self._path}: {text}.") from error
-        time.sleep(max(0.0, when + self._latency - time.monotonic()))
+        self._clock.sleep(when + self._latency - self._clock.now())
         return depth.reshape(height, width).astype(np.uint16), color, when
 
     def close(self) -> None:

@@ -4,7 +4,6 @@ import enum
 import importlib.util
 import logging
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from types import TracebackType
@@ -13,6 +12,7 @@ from painter.camera.clock import CameraClock
 from painter.camera.config import CameraDriverConfig
 from painter.camera.frames import Camera, CameraError, CameraFrame, FrameSource
 from painter.errors import InputError
+from painter.timebase import TimeBase
 from perception.depth import CameraIntrinsics
 
 _LOGGER = logging.getLogger(__name__)
@@ -57,7 +57,7 @@ class Reading:
 
     Attributes:
         frame: Newest picture; None before the first.
-        taken: When it was taken, by `time.monotonic()`, s.
+        taken: When it was taken, by the reader's clock, s.
         health: How the camera fares.
     """
 
@@ -104,14 +104,19 @@ class CameraReader:
     """The reading thread; a context manager that lets the camera go at its end."""
 
     def __init__(
-        self, open_camera: Callable[[], Camera], config: CameraDriverConfig
+        self,
+        open_camera: Callable[[], Camera],
+        config: CameraDriverConfig,
+        clock: TimeBase | None = None,
     ) -> None:
         """Starts reading.
 
         Args:
             open_camera: Opens the camera, as often as it is lost.
             config: Latency, ages and tries.
+            clock: The run's; None = the machine's.
         """
+        self._clock = clock or TimeBase()
         self._open_camera = open_camera
         self._config = config
         self._reading = Reading()
@@ -171,11 +176,11 @@ class CameraReader:
         """Opens the camera and hands its pictures on; returns when asked to end."""
         camera = self._open_camera()
         clock, number = CameraClock(self._config.latency), None
-        heard = time.monotonic()
+        heard = self._clock.now()
         try:
             while not self._end.is_set():
                 frame = camera.wait(_WAIT)
-                now = time.monotonic()
+                now = self._clock.now()
                 if frame is None:
                     if now - heard > self._config.silence:
                         raise CameraError(

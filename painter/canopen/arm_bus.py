@@ -20,6 +20,7 @@ from painter.canopen.frames import (
     HEARTBEAT_BASE,
     SYNC_ID,
     Frame,
+    frame_time,
 )
 from painter.canopen.io_client import IoClient
 from painter.canopen.links import Link, LinkError
@@ -62,7 +63,10 @@ class ArmBus:
         self.nodes: list[NodeClient] = [*self.drives, self.io]
         self._by_id = {node.node_id: node for node in self.nodes}
         self._follower = SetpointFollower(
-            bus.joint_limits(), cycle=bus.cycle, timeout=bus.timeouts.setpoint
+            bus.joint_limits(),
+            cycle=bus.cycle,
+            timeout=bus.timeouts.setpoint,
+            sync_time=frame_time(0, bus.bitrate),
         )
         self.phase = Phase.DOWN
         self.reason = ""
@@ -317,8 +321,7 @@ class ArmBus:
     def _send_outputs(self) -> None:
         if not self._is_cyclic:
             return
-        if self.io.is_configured:
-            self._send(self.io.rpdo())  # First, so that the gun is never last.
+        self.io.tell()  # First, so that the gun is never last.
         for drive in self.drives:
             self._send(drive.rpdo())
 

@@ -170,8 +170,8 @@ class IoConfig:
         flow_full_scale: Value of 6411h:1 at nominal flow.
         pressure_scale: Pressure of the pump at one count of 6401h:1, Pa.
         pressure_low: Pressure below which spraying stops the arm, Pa.
-        rpdo_cycles: Cycles without a process data object of the master after which the
-            node closes the gun by itself.
+        deadline: Time without a word of the master after which the node closes the gun
+            by itself, s; whole milliseconds. The master says it twice a cycle.
     """
 
     node_id: int = 6
@@ -181,7 +181,7 @@ class IoConfig:
     flow_full_scale: int = 32767
     pressure_scale: float = 1000.0
     pressure_low: float = 0.0
-    rpdo_cycles: int = 2
+    deadline: float = 0.005
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -268,7 +268,12 @@ class BusConfig:
                 _check_positive(f"timeouts.{name}", getattr(self.timeouts, name))
         _check_range("timeouts.sdo_retries", self.timeouts.sdo_retries, 0, 100)
         _check_range("timeouts.rpdo_cycles", self.timeouts.rpdo_cycles, 2, 1000)
-        _check_range("io.rpdo_cycles", self.io.rpdo_cycles, 2, 1000)
+        least = self.cycle / 2.0 + 0.002  # Timers of nodes tick each millisecond.
+        if not least <= self.io.deadline <= 60.0:
+            raise ValueError(
+                f"io.deadline must be {least:g} to 60 s (half a cycle and 2 ms), "
+                f"got {self.io.deadline!r}."
+            )
         _check_range("io.valve_bit", self.io.valve_bit, 0, 7)
         _check_range("io.estop_bit", self.io.estop_bit, 0, 7)
         _check_range("io.flow_full_scale", self.io.flow_full_scale, 1, 32767)

@@ -36,6 +36,7 @@ from painter.canopen.realtime import (
 from painter.canopen.sample_ring import SampleRing, Samples
 from painter.canopen.setpoints import Setpoint
 from painter.errors import BusError, PainterError
+from painter.timebase import TimeBase
 
 _LOGGER = logging.getLogger(__name__)
 _SWITCH_OFF_TIME = 5.0
@@ -71,6 +72,7 @@ class BusLoop:
         mailbox: Mailbox,
         ring: SampleRing,
         log: Connection | None = None,
+        clock: TimeBase | None = None,
     ) -> None:
         """Connects to the bus.
 
@@ -80,16 +82,18 @@ class BusLoop:
             mailbox: Where reports go.
             ring: Where measured samples go.
             log: Pipe of a `FrameLogger`, or None.
+            clock: The run's; None = the machine's.
 
         Raises:
             PainterError: The link cannot be opened, or an EDS not be used.
         """
+        self._clock = clock or TimeBase()
         link = open_link(bus)
-        self._link: Link = link if log is None else TappedLink(link, log)
+        self._link: Link = link if log is None else TappedLink(link, log, self._clock)
         self._master = ArmBus(bus, self._link)
         self._commands = commands
         self._mailbox = mailbox
-        self._ticker = Ticker(bus.cycle)
+        self._ticker = Ticker(bus.cycle, self._clock)
         self._master.before_sync = self._ticker.meet
         self._master.measured = ring.put
         self._refusal = ""
@@ -108,7 +112,9 @@ class BusLoop:
         while not self._has_ended():
             while (remaining := self._ticker.remaining()) > 0.0:
                 # Frames between two SYNCs are read at once: a fault need not wait.
-                self._master.poll(time.monotonic(), remaining)
+                now = self._clock.now()
+                again = max(0.0, self._clock.machine(self._master.io.again_at - now))
+                self._master.poll(now, min(remaining, again))
                 if self._ticker.remaining() > 0.0:
                     self._pause()
             due, skipped = self._ticker.tick()
@@ -130,13 +136,13 @@ class BusLoop:
     def _pause(self) -> None:
         """Leaves the processor for a moment while the link cannot be waited for."""
         if self._master.is_lost:
-            time.sleep(min(self._ticker.remaining(), self._ticker.period))
+            time.sleep(self._ticker.remaining())
 
     def _has_ended(self) -> bool:
         if self._end_at is None:
             return False
         is_off = self._master.phase in (Phase.DOWN, Phase.STOPPED)
-        return (is_off and self._master.is_idle) or time.monotonic() > self._end_at
+        return (is_off and self._master.is_idle) or self._clock.now() > self._end_at
 
     def _take_commands(self) -> None:
         if self._end_at is not None:
@@ -171,28 +177,36 @@ class BusLoop:
 
     def _end(self, wait: float) -> None:
         """Lets a stop finish, then switches off."""
-        deadline = time.monotonic() + wait
-        while time.monotonic() < deadline:
+        deadline = self._clock.now() + wait
+        while self._clock.now() < deadline:
             time.sleep(self._ticker.remaining())
             due, skipped = self._ticker.tick()
             self._master.cycle(due, overruns=skipped)
-        self._end_at = time.monotonic() + _SWITCH_OFF_TIME
+        self._end_at = self._clock.now() + _SWITCH_OFF_TIME
         self._master.shut_down()
 
 
 class BusProcess:
     """The diagram's side of the bus; a context manager that switches off at its end."""
 
-    def __init__(self, bus: BusConfig, *, log: Path | None = None) -> None:
+    def __init__(
+        self,
+        bus: BusConfig,
+        *,
+        log: Path | None = None,
+        clock: TimeBase | None = None,
+    ) -> None:
         """Starts the process; the bus itself is begun by `start`.
 
         Args:
             bus: What is on the bus.
             log: Where to write all frames in candump's format, or None.
+            clock: The run's; None = the machine's.
 
         Raises:
             InputError: The log cannot be written.
         """
+        self.clock = clock or TimeBase()
         self._logger = None if log is None else FrameLogger(log, bus.channel)
         pipe = None if self._logger is None else self._logger.pipe
         context = multiprocessing.get_context("spawn")
@@ -202,7 +216,15 @@ class BusProcess:
         self._errors, errors = context.Pipe(duplex=False)
         self._process = context.Process(
             target=_run,
-            args=(bus, theirs, self._mailbox.name, self._ring.name, errors, pipe),
+            args=(
+                bus,
+                theirs,
+                self._mailbox.name,
+                self._ring.name,
+                errors,
+                pipe,
+                self.clock,
+            ),
             name="painter bus",
             daemon=False,
         )
@@ -271,18 +293,18 @@ class BusProcess:
         return self._ring.since(since)
 
     def now(self) -> float:
-        """Returns the bus's clock, s: the machine's monotonic one."""
-        return time.monotonic()
+        """Returns the bus's clock, s."""
+        return self.clock.now()
 
     def wait_until(self, when: float) -> None:
         """Waits for a time, s, of the bus's clock."""
-        time.sleep(max(0.0, when - time.monotonic()))
+        self.clock.sleep(when - self.clock.now())
 
     def close(self) -> None:
         """Switches the arm off and ends the process."""
         with contextlib.suppress(BusError):
             self._send("end")
-        self._process.join(_SWITCH_OFF_TIME + _STOP_TIME)
+        self._process.join(self.clock.machine(_SWITCH_OFF_TIME + _STOP_TIME))
         if self._process.is_alive():
             _LOGGER.error("the bus process did not end; killed.")
             self._process.kill()
@@ -320,12 +342,13 @@ def _run(
     ring_name: str,
     errors: Connection,
     log: Connection | None,
+    clock: TimeBase,
 ) -> None:
     """The bus process: Ctrl-C is the parent's business, which then ends the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     mailbox, ring = Mailbox(name=mailbox_name), SampleRing(name=ring_name)
     try:
-        BusLoop(bus, commands, mailbox, ring, log).run()
+        BusLoop(bus, commands, mailbox, ring, log, clock).run()
     except PainterError as error:
         errors.send(str(error))
         os._exit(1)

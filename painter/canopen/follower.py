@@ -31,7 +31,12 @@ class SetpointFollower:
     """
 
     def __init__(
-        self, joints: Sequence[JointLimits], *, cycle: float, timeout: float
+        self,
+        joints: Sequence[JointLimits],
+        *,
+        cycle: float,
+        timeout: float,
+        sync_time: float = 0.0,
     ) -> None:
         """Creates a follower that stands at zero.
 
@@ -39,9 +44,11 @@ class SetpointFollower:
             joints: Limits in the order of `units.JOINTS`.
             cycle: Time between two steps, s.
             timeout: Time without a setpoint while moving or spraying, s.
+            sync_time: From when a SYNC is due until drives have it, s.
         """
         self._joints = joints
         self._cycle = cycle
+        self._ahead = TARGET_CYCLES * cycle + sync_time
         self._guard = SetpointGuard(joints, timeout)
         self._buffer = SetpointBuffer()
         self._ramp: StopRamp | None = None
@@ -98,7 +105,7 @@ class SetpointFollower:
         if self._ramp is not None:
             self._take(self._ramp.sample(now))
             return None
-        sample = self._buffer.sample(now + TARGET_CYCLES * self._cycle)
+        sample = self._buffer.sample(now + self._ahead)
         if sample is None:
             self._take(Sample(self.q, np.zeros(5), 0.0, 0.0))
             return None

@@ -21,6 +21,7 @@ from painter.canopen.candump import LogRecord, format_record
 from painter.canopen.frames import Frame
 from painter.canopen.links import Link
 from painter.errors import InputError
+from painter.timebase import TimeBase
 
 _LOGGER = logging.getLogger(__name__)
 # Time, identifier with two flags, length, data; _LOST in place of the length tells how
@@ -38,18 +39,22 @@ _END_TIME = 60.0  # s; on a machine that works on other things.
 class TappedLink:
     """A link whose frames are copied into a pipe."""
 
-    def __init__(self, link: Link, pipe: Connection) -> None:
+    def __init__(
+        self, link: Link, pipe: Connection, clock: TimeBase | None = None
+    ) -> None:
         """Stands before a link.
 
         Args:
             link: The way to the bus.
             pipe: Write end to a `FrameLogger`.
+            clock: The run's; None = the machine's.
         """
         self._link = link
         self._pipe = pipe
         os.set_blocking(pipe.fileno(), False)
         # Wall-clock time that goes on evenly when the clock is set.
-        self._offset = time.time() - time.monotonic()
+        self._clock = clock or TimeBase()
+        self._offset = time.time() - self._clock.now()
         self._pending = bytearray()
         self._lost = 0
 
@@ -79,7 +84,7 @@ class TappedLink:
 
     def _note(self, frame: Frame, way: int) -> None:
         head = frame.cob_id | way | (_ERROR if frame.is_error else 0)
-        now = time.monotonic() + self._offset
+        now = self._clock.now() + self._offset
         self._pending += _RECORD.pack(now, head, len(frame.data), frame.data)
 
     def _flush(self) -> None:

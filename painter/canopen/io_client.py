@@ -1,5 +1,6 @@
 """The master's view of the I/O node: the gun, the e-stop chain, the pump."""
 
+import math
 from collections.abc import Callable
 
 from painter.canopen.bus_config import BusConfig
@@ -16,6 +17,7 @@ class IoClient(NodeClient):
         trigger: Commanded share of nominal flow, 0 to 1; 0 closes the valve.
         inputs: Last digital inputs; None before the first.
         pressure: Last pump pressure, Pa.
+        again_at: When the gun is to be told again, s.
     """
 
     def __init__(self, bus: BusConfig, send: Callable[[Frame], None]) -> None:
@@ -30,6 +32,8 @@ class IoClient(NodeClient):
             profile=401,
         )
         self._config = bus.io
+        self._half_cycle = bus.cycle / 2.0
+        self.again_at = math.inf
         self.trigger = 0.0
         self.inputs: int | None = None
         self.pressure = 0.0
@@ -48,6 +52,23 @@ class IoClient(NodeClient):
         self.pressure = counts * self._config.pressure_scale
         self.got_tpdo = True
         return True
+
+    def poll(self, now: float) -> None:
+        """Lets time pass; tells the gun what it was told half a cycle ago."""
+        super().poll(now)
+        if now >= self.again_at:
+            self.again_at = math.inf
+            self._send(self.rpdo())
+
+    def tell(self) -> None:
+        """Sends valve and flow now, and once more in half a cycle.
+
+        The node closes the gun by itself when the master has been silent for a cycle.
+        Said once a cycle, a word that is a little late would be as good as none.
+        """
+        if self.is_configured:
+            self._send(self.rpdo())
+            self.again_at = self.now + self._half_cycle
 
     def rpdo(self) -> Frame:
         """Returns the frame with valve and flow."""

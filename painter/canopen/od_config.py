@@ -167,7 +167,7 @@ def plan_drive(
     _plan_monitoring(plan, bus)
     plan.pdos_off((0x1400, 0x1800, 0x1801))
     plan.pdo(0x1400, 0x1600, RPDO_BASES[0] + node, 1, drive_rpdo(mode))
-    _plan_deadline(plan, bus, bus.timeouts.rpdo_cycles)
+    _plan_deadline(plan, bus.timeouts.rpdo_cycles * bus.cycle)
     plan.pdo(0x1800, 0x1A00, TPDO_BASES[0] + node, 1, DRIVE_TPDO)
     plan.pdo(0x1801, 0x1A01, TPDO_BASES[1] + node, SLOW_EVERY, DRIVE_SLOW_TPDO)
     return plan
@@ -183,18 +183,18 @@ def plan_io(bus: BusConfig, device: DeviceDescription) -> ConfigPlan:
     _plan_monitoring(plan, bus)
     plan.pdos_off((0x1400, 0x1800))
     plan.pdo(0x1400, 0x1600, RPDO_BASES[0] + node, 255, IO_RPDO)
-    _plan_deadline(plan, bus, bus.io.rpdo_cycles)
+    _plan_deadline(plan, bus.io.deadline)
     plan.want(0x1800, 5, _IO_EVENT_MS, "event timer, ms", "sent on change only.")
     plan.pdo(0x1800, 0x1A00, TPDO_BASES[0] + node, 255, IO_TPDO)
     return plan
 
 
-def _plan_deadline(plan: ConfigPlan, bus: BusConfig, cycles: int) -> None:
-    """Lets the node notice at once that the master's process data stay away.
+def _plan_deadline(plan: ConfigPlan, deadline: float) -> None:
+    """Lets the node notice soon, s, that the master's process data stay away.
 
     Source: CiA 301 v4.2.0, 7.5.2.35: the event timer of an RPDO is its deadline, in ms.
     """
-    milliseconds = round(cycles * bus.cycle * 1e3)
+    milliseconds = round(deadline * 1e3)
     own = "a dead master is noticed by its heartbeat alone."
     plan.want(0x1400, 5, milliseconds, "deadline of the RPDO, ms", own)
 

@@ -4,10 +4,11 @@ import ctypes
 import gc
 import logging
 import os
-import time
 from dataclasses import dataclass
 
 import numpy as np
+
+from painter.timebase import TimeBase
 
 _LOGGER = logging.getLogger(__name__)
 _PRIORITY = 60
@@ -23,7 +24,7 @@ _KEPT = 12_000  # A minute at 200 Hz; sorting them takes less than a cycle.
 
 @dataclass(frozen=True)
 class Lateness:
-    """How late cycles began, s.
+    """How late cycles began, s by the machine's clock.
 
     Attributes:
         count: Cycles since the loop began; the rest is of the last minute.
@@ -63,13 +64,15 @@ def use_fifo(priority: int = _PRIORITY) -> bool:
 class Ticker:
     """Due times, one a period; late ones are counted and skipped, never caught up."""
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, clock: TimeBase | None = None) -> None:
         """Creates a ticker whose first tick is due one period from now.
 
         Args:
             period: Time between two ticks, s.
+            clock: Counts it; None = the machine's.
         """
         self.period = period
+        self._clock = clock or TimeBase()
         self.overruns = 0
         self.begin()
         self._late = np.zeros(_KEPT)
@@ -77,11 +80,11 @@ class Ticker:
 
     def begin(self) -> None:
         """Makes the next tick due one period from now."""
-        self.due = time.monotonic() + self.period
+        self.due = self._clock.now() + self.period
 
     def remaining(self) -> float:
-        """Time until `LEAD` before the next tick, s; not negative."""
-        return max(0.0, self.due - LEAD - time.monotonic())
+        """Time of the machine until `LEAD` before the next tick, s; not negative."""
+        return max(0.0, self._clock.machine(self.due - self._clock.now()) - LEAD)
 
     def tick(self) -> tuple[float, int]:
         """Ends the wait for a tick that is due at once or in `LEAD`.
@@ -90,7 +93,7 @@ class Ticker:
             When it was due, s, and how many ticks were skipped before it because their
             time had passed too.
         """
-        late = time.monotonic() - self.due
+        late = self._clock.now() - self.due
         skipped = int(late // self.period) if late > 0.0 else 0
         self.overruns += skipped
         due = self.due + skipped * self.period
@@ -100,9 +103,9 @@ class Ticker:
     def meet(self) -> None:
         """Watches the clock until the last tick is due, and notes how late that is."""
         due = self.due - self.period
-        while (late := time.monotonic() - due) < 0.0:
+        while (late := self._clock.now() - due) < 0.0:
             pass
-        self._late[self._count % _KEPT] = late
+        self._late[self._count % _KEPT] = self._clock.machine(late)
         self._count += 1
 
     def lateness(self) -> Lateness:

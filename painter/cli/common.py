@@ -35,6 +35,15 @@ SetOption = Annotated[
 OutOption = Annotated[
     Path, typer.Option("--out", metavar="DIR", help="Folder to write the result to.")
 ]
+RateOption = Annotated[
+    float,
+    typer.Option(
+        min=0.05,
+        max=1.0,
+        help="Seconds of the run's clock in a second: below 1, simulated drives, world "
+        "and brain have more time; the same for `painter drives` and `painter deploy`.",
+    ),
+]
 JsonOption = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON alone on stdout.")
 ]

@@ -18,6 +18,7 @@ from painter.canopen.bus_process import BusProcess
 from painter.canopen.robot_clock import RobotClock
 from painter.cli.common import (
     JsonOption,
+    RateOption,
     ScenarioArgument,
     SetOption,
     print_result,
@@ -36,8 +37,11 @@ from painter.run.folder import SCENARIO, RunFolder
 from painter.run.report import finish_run
 from painter.run.unfinished import rest_of_run
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
+from painter.timebase import TimeBase
 from perception.depth import CameraIntrinsics
 
+# Deadlines of process data in a rehearsal with simulated drives, s.
+REHEARSAL_TIME = 0.1
 INTERRUPTED = "interrupted by the operator."
 BUS_LOG = "bus.log"
 # Age at which pictures of simulated drives are handed on, s: rendering takes less.
@@ -68,7 +72,8 @@ def deploy(
         typer.Option(
             metavar="PATH",
             help="Take pictures from this socket of `painter drives --scenario`, "
-            "through librealsense's software device.  [default: the camera]",
+            "through librealsense's software device. Process data may then be "
+            "late by 0.1 s: the computer also simulates.  [default: the camera]",
         ),
     ] = None,
     overrides: SetOption = None,
@@ -102,6 +107,7 @@ def deploy(
             "diagram without holding up the arm.",
         ),
     ] = 0.4,
+    rate: RateOption = 1.0,
     as_json: JsonOption = False,
 ) -> None:
     """Paint with the robot: check, look, scan, segment, plan, paint, report.
@@ -122,6 +128,11 @@ def deploy(
             f"--speed {speed:g}: needs --dry-run; the film would be "
             f"{1.0 / speed:.1f} times as thick."
         )
+    if rate < 1.0 and camera is None:
+        raise InputError(
+            f"--rate {rate:g}: needs --camera, a rehearsal; a robot's clock runs at 1."
+        )
+    clock = TimeBase(rate)
     earlier = None if resume is None else RunFolder.open(resume)
     name = scenario or "cubes" if earlier is None else str(earlier.path / SCENARIO)
     job = slowed(load_scenario(name, overrides or ()), speed)
@@ -130,13 +141,14 @@ def deploy(
     bus = dataclasses.replace(
         bus, interface=interface or bus.interface, channel=channel or bus.channel
     )
+    bus = bus if camera is None else rehearsed(bus)
     folder = RunFolder.create(out, dump_scenario(job))
     start = time.perf_counter()
     with ExitStack() as stack:
         stopper = stack.enter_context(interruptions())
         log = folder.path / BUS_LOG if log_bus else None
-        process = stack.enter_context(BusProcess(bus, log=log))
-        reader = stack.enter_context(_camera(job, camera))
+        process = stack.enter_context(BusProcess(bus, log=log, clock=clock))
+        reader = stack.enter_context(_camera(job, camera, clock))
         try:
             _check(folder, job, bus, process, reader)
             body = Body(
@@ -153,6 +165,7 @@ def deploy(
                 bus_time_s=process.now(),
                 dry_run=dry_run,
                 speed=speed,
+                rate=rate,
             )
             show = stack.enter_context(progress(f"Deploying {job.name}"))
             tell = event_watch(folder, show)
@@ -195,6 +208,25 @@ def deploy(
         raise FaultError(f"{result.value}: {cause}")
 
 
+def rehearsed(bus: BusConfig) -> BusConfig:
+    """Returns a bus whose deadlines forgive what a computer holds processes up.
+
+    Robot and drives, which wait for nobody, are then two more programs on a computer
+    that knows no deadlines: it may hold up either for some 10 ms at any time.
+    """
+    return dataclasses.replace(
+        bus,
+        timeouts=dataclasses.replace(
+            bus.timeouts,
+            tpdo=max(bus.timeouts.tpdo, REHEARSAL_TIME),
+            rpdo_cycles=max(
+                bus.timeouts.rpdo_cycles, round(REHEARSAL_TIME / bus.cycle)
+            ),
+        ),
+        io=dataclasses.replace(bus.io, deadline=max(bus.io.deadline, REHEARSAL_TIME)),
+    )
+
+
 def slowed(job: Scenario, speed: float) -> Scenario:
     """Returns a job in which everything moves at a share of its speed.
 
@@ -229,19 +261,19 @@ def interruptions() -> Iterator[Callable[[], str | None]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _camera(job: Scenario, path: str | None) -> CameraReader:
+def _camera(job: Scenario, path: str | None, clock: TimeBase) -> CameraReader:
     """Returns the camera's reader, of the device or of `painter drives`' pictures."""
     config, stereo = job.wall_camera.driver, job.wall_camera.stereo
     source = None
     if path is not None:
-        source = FrameLink(path, latency=PICTURE_LATENCY)
+        source = FrameLink(path, latency=PICTURE_LATENCY, clock=clock)
         # Pictures come as seldom as the scenario's rate says, and may be rendered late.
         config = dataclasses.replace(
             config, latency=PICTURE_LATENCY, max_age=1.0, silence=3.0
         )
     wanted = CameraIntrinsics.from_stereo(stereo)
     opener = camera_opener(config, wanted, baseline=stereo.baseline, source=source)
-    return CameraReader(opener, config)
+    return CameraReader(opener, config, clock)
 
 
 def _check(

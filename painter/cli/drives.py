@@ -14,9 +14,10 @@ from painter.canopen.realtime import use_fifo
 from painter.canopen.sim.rack import Fault
 from painter.canopen.sim.server import RackServer
 from painter.canopen.units import AXES
-from painter.cli.common import JsonOption, SetOption, print_result
+from painter.cli.common import JsonOption, RateOption, SetOption, print_result
 from painter.errors import InputError
 from painter.resources import models_path
+from painter.timebase import TimeBase
 
 if TYPE_CHECKING:
     from painter.cli.hil_bench import HilBench
@@ -75,6 +76,7 @@ def drives(
             "what is truly wall to this run of `painter deploy`.",
         ),
     ] = None,
+    rate: RateOption = 1.0,
     duration: Annotated[
         float | None,
         typer.Option(min=0.0, help="Time to run, s.  [default: until interrupted]"),
@@ -99,7 +101,7 @@ def drives(
     )
     plan = sorted((_fault(word) for word in faults or ()), key=lambda item: item[0])
     bench = None if scenario is None else _bench(scenario, overrides or (), camera)
-    server = RackServer(bus, None if bench is None else bench.load)
+    server = RackServer(bus, None if bench is None else bench.load, TimeBase(rate))
     if bench is not None:
         bench.attach(server)
     use_fifo(_PRIORITY)
@@ -126,6 +128,7 @@ def drives(
         "frames": rack.wire.frame_count,
         "bus_load": rack.wire.busy_time / rack.now if rack.now else 0.0,
         "slips": server.slips,
+        "sync_late_s": server.sync_late,
     }
     figures |= {f"{name}_state": d.state.value for name, d in rack.drives.items()}
     print_result(figures, as_json=as_json)

@@ -50,7 +50,7 @@ class HilBench:
                 return
             is_open = io.outputs >> config.valve_bit & 1
             trigger = io.flow / config.flow_full_scale if is_open else 0.0
-            self._world.put(server.monotonic(), self.load.state, trigger)
+            self._world.put(server.clock_time(), self.load.state, trigger)
 
         server.rack.stepped = step
 

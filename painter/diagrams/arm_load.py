@@ -44,8 +44,9 @@ class ArmLoad:
         self._simulator = Simulator(diagram)
         self._context = self._simulator.get_mutable_context()
         self._state_port = diagram.GetOutputPort("state")
+        self._asked = np.concatenate([home, np.zeros(NQ)])
         self._desired = diagram.GetInputPort("desired_state").FixValue(
-            self._context, np.concatenate([home, np.zeros(NQ)])
+            self._context, self._asked
         )
         self._simulator.Initialize()
         self._steps = 0
@@ -62,10 +63,12 @@ class ArmLoad:
 
     def step(self, demand: FloatArray, velocity: FloatArray, dt: float) -> None:
         """See `painter.canopen.sim.load.Load`."""
-        # The demand is for the step's end, the loop closes at its beginning.
-        q = joints_from_axes(demand - velocity * dt)
-        desired = np.concatenate([q, joints_from_axes(velocity)])
-        self._desired.GetMutableData().get_mutable_value().SetFromVector(desired)
+        # The demand is for the step's end, the loop closes at its beginning: there it
+        # is held against what was asked for then.
+        self._desired.GetMutableData().get_mutable_value().SetFromVector(self._asked)
+        self._asked = np.concatenate(
+            [joints_from_axes(demand), joints_from_axes(velocity)]
+        )
         self._steps += 1
         # Not the sum of dt: the plant's own steps are at whole multiples.
         self._simulator.AdvanceTo(self._steps * dt)

@@ -40,7 +40,7 @@ class WorldTruth:
 
     Attributes:
         film: On the wall.
-        stamps: (k,) s by `time.monotonic()`, of the clearances.
+        stamps: (k,) s by the run's clock, of the clearances.
         clearance: (k,) m, from the scene.
         floor_clearance: (k,) m, from the floor and the robot's own frame.
         lost: Samples that were overwritten before they were read; the film lacks them.
@@ -82,7 +82,7 @@ class WorldProcess:
         """Says how the arm is; to be called every `PERIOD`.
 
         Args:
-            when: By `time.monotonic()`, s.
+            when: By the run's clock, s.
             state: (10,) true q, v; rad, rad/s.
             trigger: What the gun does, 0 to 1.
         """

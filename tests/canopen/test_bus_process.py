@@ -46,7 +46,7 @@ def bus(tmp_path):
         bus.timeouts, heartbeat=3.0, tpdo=2.0, setpoint=2.0, boot=20.0, sdo=2.0,
         brake=20.0, transition=20.0, rpdo_cycles=200,
     )  # fmt: skip
-    bus.io = dataclasses.replace(bus.io, rpdo_cycles=200)
+    bus.io = dataclasses.replace(bus.io, deadline=4.0)
     return bus
 
 

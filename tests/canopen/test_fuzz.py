@@ -59,12 +59,10 @@ def positions(lab):
 
 def run_noise(lab, ids, seed, total):
     noise = Noise(lab.rack, seed)
+    lab.rack.stepped = lambda: noise.send(ids)
     while noise.count < total:
-        for i in range(5):
-            noise.send(ids)
-            lab.rack.advance(lab.now + i * 1e-3)
-            lab.master.poll(lab.now + i * 1e-3)
         lab.step()
+    lab.rack.stepped = lambda: None
     return noise.count
 
 

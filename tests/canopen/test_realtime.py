@@ -5,13 +5,14 @@ import sys
 
 import pytest
 
+from painter import timebase
 from painter.canopen import realtime
 
 
 @pytest.fixture
 def clock(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(realtime.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(timebase.time, "monotonic", lambda: now[0])
     return now
 
 
@@ -38,6 +39,16 @@ def test_ticks_whose_time_has_passed_are_counted_and_skipped(clock):
     assert dut.remaining() == pytest.approx(0.0024)
 
 
+def test_at_half_the_rate_a_period_takes_the_machine_twice_as_long(clock):
+    dut = realtime.Ticker(0.005, timebase.TimeBase(0.5))
+    assert dut.remaining() == pytest.approx(0.0095)
+    clock[0] = 100.0102
+    assert dut.tick() == (pytest.approx(50.005), 0)
+    dut.meet()
+    # Lateness is the machine's: that is what is judged.
+    assert dut.lateness().worst == pytest.approx(2e-4)
+
+
 def test_an_early_loop_waits_for_the_due_time(monkeypatch):
     now = [100.0]
 
@@ -45,7 +56,7 @@ def test_an_early_loop_waits_for_the_due_time(monkeypatch):
         now[0] += 1e-5
         return now[0]
 
-    monkeypatch.setattr(realtime.time, "monotonic", run_on)
+    monkeypatch.setattr(timebase.time, "monotonic", run_on)
     dut = realtime.Ticker(0.005)
     due = dut.due
     now[0] = due - 0.0004

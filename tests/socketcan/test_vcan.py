@@ -67,7 +67,7 @@ def bus():
         bus.timeouts, heartbeat=20.0, tpdo=20.0, setpoint=20.0, boot=10.0, sdo=5.0,
         brake=60.0, transition=60.0, rpdo_cycles=1000,
     )  # fmt: skip
-    bus.io = dataclasses.replace(bus.io, rpdo_cycles=1000)
+    bus.io = dataclasses.replace(bus.io, deadline=5.0)
     return bus
 
 

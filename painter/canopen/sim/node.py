@@ -42,6 +42,8 @@ HEARTBEAT_LOST = 0x8130
 PDO_LENGTH = 0x8210
 RPDO_TIMEOUT = 0x8250
 BOOT_TIME = 0.02
+# Timers count ticks of 1 ms: a deadline of N ms ends with the Nth tick.
+_TICK = 0.001
 
 
 class SimNode:
@@ -242,7 +244,7 @@ class SimNode:
             came = self._came.get(pdo.number)
             if came is None or not pdo.event_time or pdo.number in self._overdue:
                 continue
-            if self.now - came > pdo.event_time:
+            if self.now - came > pdo.event_time - _TICK:
                 self._overdue.add(pdo.number)
                 self.emergency(RPDO_TIMEOUT, 0x11)
                 self.on_connection_lost()

@@ -85,8 +85,8 @@ class Rack:
 
     def advance(self, until: float) -> None:
         """Lets frames, motors and timers run, 1 ms a step."""
-        while self.now + STEP <= until + 1e-9:
-            self.now += STEP
+        while (after := STEP * (round(self.now / STEP) + 1)) <= until + 1e-9:
+            self.now = after
             self.wire.advance(self.now)
             for node in self.nodes:
                 node.step(self.now)

@@ -1,10 +1,10 @@
 """Simulated drives as a process: a rack in real time, behind a link."""
 
 import contextlib
+import math
 import os
 import select
 import socket
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,9 +14,15 @@ from painter.canopen.links import Link, LinkError, open_link, pack_frame, unpack
 from painter.canopen.realtime import settle_memory
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.rack import STEP, Rack
+from painter.timebase import TimeBase
 
 _MOST_BEHIND = 0.1
 _MOST_AT_ONCE = 2.0 * STEP
+# How long the rack's time waits for a SYNC that is due, s: what this computer's
+# scheduler does to either process is not of the bus.
+_PATIENCE = 0.05
+# A SYNC that comes a cycle late, less this, s, is the one after the one that was due.
+_EARLY = 0.001
 
 
 class LocalHub:
@@ -102,15 +108,25 @@ class RackServer:
     """Runs a rack in real time and carries frames between its wire and a link.
 
     Frames from the link take their time on the wire like all others, so what the rack
-    charges is what a real bus would.
+    charges is what a real bus would. While SYNCs come, the rack's time is theirs: one
+    cycle from each to the next. One that is late is waited for, and then the rack's
+    clock goes on from when it was due; one that is early puts it forward.
+
+    Attributes:
+        rack: The simulated nodes.
+        slips: How often the rack's time fell behind for good.
+        sync_late: Longest time that the rack waited for a SYNC, s by the run's clock.
     """
 
-    def __init__(self, bus: BusConfig, load: Load | None = None) -> None:
+    def __init__(
+        self, bus: BusConfig, load: Load | None = None, clock: TimeBase | None = None
+    ) -> None:
         """Opens the link of the bus file ("local" listens) and powers the rack.
 
         Args:
             bus: What is on the bus.
             load: What the motors move; see `Rack`.
+            clock: The run's; None = the machine's.
 
         Raises:
             LinkError: The link cannot be opened.
@@ -120,19 +136,25 @@ class RackServer:
             LocalHub(bus.channel) if bus.interface == "local" else open_link(bus)
         )
         self._send = self.rack.wire.attach(self._to_link)
-        self._start = time.monotonic()
+        self._clock = clock or TimeBase()
+        # The run's clock at the rack's time 0, s: as the rack's own clock has it, which
+        # follows each SYNC, and as those SYNCs have it that were least late.
+        self._start = self._origin = self._clock.now()
         self.slips = 0
-        self._synced = 0.0
+        self.sync_late = 0.0
+        # When the next SYNC is due in the rack's time, s.
+        self._sync_due = math.inf
+        self._looked = 0.0  # When frames were last looked for, s.
 
     def run(self, is_done: Callable[[float], bool]) -> None:
         """Runs until `is_done`, which is asked about every ms with the rack's time."""
         settle_memory()
         while not is_done(self.rack.now):
-            self._serve(self._now())
+            self._serve()
 
-    def monotonic(self) -> float:
-        """Returns the rack's present time by `time.monotonic()`, s."""
-        return self._start + self.rack.now
+    def clock_time(self) -> float:
+        """Returns the rack's present time by the run's clock, s."""
+        return self._origin + self.rack.now
 
     def close(self) -> None:
         """Gives the link up."""
@@ -140,45 +162,71 @@ class RackServer:
 
     def _now(self) -> float:
         """Time of the rack; it slips when this process was held up for long."""
-        now = time.monotonic() - self._start
+        now = self._clock.now() - self._start
         behind = now - self.rack.now
         if behind > _MOST_BEHIND:
             self._start += behind - STEP
+            self._origin = self._start
             self.slips += 1
             return self.rack.now + STEP
         return now
 
-    def _serve(self, now: float) -> None:
-        due = self.rack.now + STEP
-        end = self.rack.wire.next_end()
-        wait = max(0.0, min(due, due if end is None else end) - now)
-        try:
-            frames = self._link.receive(wait)
-        except LinkError:
-            frames = []
-            time.sleep(STEP)
-            with contextlib.suppress(LinkError):
-                self._link.reopen()
-        now = max(self._now(), self.rack.now)
-        has_sync = any(frame.cob_id == SYNC_ID for frame in frames)
-        when = self.rack.now if has_sync else now
+    def _horizon(self, now: float) -> float:
+        """How far the rack's time may go: to a SYNC that is due, but not for ever."""
+        due = self._sync_due
+        return now if now > due + _PATIENCE else min(now, due)
+
+    def _serve(self) -> None:
+        frames = self._receive(self._clock.machine(self._wait(self._now())))
+        now = self._now()
+        looked, self._looked = self._looked, now
         for frame in frames:
             if frame.cob_id == SYNC_ID:
-                when = self._sync_time(now)
-                self.rack.advance(when)
+                now = self._looked = self._take_sync(now, looked)
             if not frame.is_error:  # Of this computer's controller; no node sees it.
-                self._send(frame, when)
+                # Held up, this process cannot know when it came: before the next step.
+                self._send(frame, self.rack.now)
         # Held up, it goes on in short steps: there may be frames to be read between.
-        self.rack.advance(min(now, self.rack.now + _MOST_AT_ONCE))
+        self.rack.advance(min(self._horizon(now), self.rack.now + _MOST_AT_ONCE))
 
-    def _sync_time(self, now: float) -> float:
-        """Returns when a SYNC came: when it was due, if this process was held up since.
+    def _wait(self, now: float) -> float:
+        """How long there is nothing to do but to look for frames, s; a step at most."""
+        step, end = self.rack.now + STEP, self.rack.wire.next_end()
+        due = step if end is None else min(step, end)
+        is_held = now >= due > self._horizon(now) + 1e-9
+        return STEP if is_held else min(max(0.0, due - now), STEP)
 
-        Else nodes would see none for long, and then several at once.
+    def _receive(self, wait: float) -> list[Frame]:
+        try:
+            return self._link.receive(wait)
+        except LinkError:
+            self._clock.sleep(STEP)
+            with contextlib.suppress(LinkError):
+                self._link.reopen()
+        return []
+
+    def _take_sync(self, now: float, looked: float) -> float:
+        """Goes on to a SYNC that came after `looked` and by now; returns its time, s.
+
+        From then on the rack's clock goes on. The first one after long is on the next
+        whole step.
         """
-        due = max(self._synced + self.rack.bus.cycle, self.rack.now)
-        self._synced = min(now, due) if now - due < _MOST_BEHIND else now
-        return self._synced
+        cycle, due = self.rack.bus.cycle, self._sync_due
+        is_new = math.isinf(due) or now > due + _PATIENCE
+        if is_new:
+            when = max(now, self.rack.now) + 0.5 * STEP
+        else:
+            # How many were due in between, and were not sent.
+            skipped = math.floor((looked - due + _EARLY) / cycle)
+            when = due + max(0, skipped) * cycle
+            self.sync_late = max(self.sync_late, looked - when)
+        when = STEP * round(when / STEP)
+        self._start += now - when
+        if is_new or self._start < self._origin:
+            self._origin = self._start
+        self.rack.advance(when)
+        self._sync_due = when + cycle
+        return when
 
     def _to_link(self, frame: Frame, now: float) -> None:
         with contextlib.suppress(LinkError):
