@@ -80,6 +80,8 @@ class WallCameraConfig:
         mount_error_m: Offset of the real mount from the modelled one along C's x, y
             and z; simulation only.
         mount_error_deg: Its rotation, roll, pitch and yaw about the same axes.
+        calibrated_m: What `painter calibrate` found of that offset, on either body.
+        calibrated_deg: Of its rotation.
         driver: How librealsense drives the real camera; not read in simulation.
     """
 
@@ -89,6 +91,8 @@ class WallCameraConfig:
     stereo: StereoConfig = dataclasses.field(default_factory=StereoConfig)
     mount_error_m: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
     mount_error_deg: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
+    calibrated_m: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
+    calibrated_deg: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
     driver: CameraDriverConfig = dataclasses.field(default_factory=CameraDriverConfig)
 
 
@@ -166,7 +170,12 @@ class Scenario:
                 raise ValueError(
                     f"arm.faults: joint must be 1 to 5, got {fault.joint!r}."
                 )
-        for name in ("mount_error_m", "mount_error_deg"):
+        for name in (
+            "mount_error_m",
+            "mount_error_deg",
+            "calibrated_m",
+            "calibrated_deg",
+        ):
             if len(getattr(self.wall_camera, name)) != 3:
                 raise ValueError(f"wall_camera.{name} must have 3 numbers.")
         for number, zone in enumerate(self.raster.zones):

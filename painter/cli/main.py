@@ -21,6 +21,7 @@ COMMANDS = {
     "simulate": "Simulate the whole paint cycle in Drake.",
     "segment": "Segment a recorded cloud or depth image into wall and rest.",
     "map": "Map a recorded RGB-D sequence: poses and one surface.",
+    "calibrate": "Find the camera's mount from pictures and joint positions.",
     "plan": "Plan the paint program of a segmented wall.",
     "place": "Propose where the base stands to paint a tile or a wall.",
     "deploy": "Paint with the robot, over its CAN bus.",

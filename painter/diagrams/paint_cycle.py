@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.geometry import Meshcat
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.config import Scenario
@@ -66,7 +67,14 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
     add = builder.AddNamedSystem
     camera_pose = add(
         "camera_pose",
-        CameraPose(kinematics=planner.kinematics, length=JOINT_HISTORY),
+        CameraPose(
+            kinematics=planner.kinematics,
+            length=JOINT_HISTORY,
+            X_CCm=RigidTransform(
+                RollPitchYaw(np.deg2rad(scenario.wall_camera.calibrated_deg)),
+                scenario.wall_camera.calibrated_m,
+            ),
+        ),
     )
     accumulator = add(
         "map_accumulator",

@@ -77,6 +77,7 @@ class CameraPose(LeafSystem):
         kinematics: ArmKinematics,
         period: float = 0.01,
         length: float = 1.0,
+        X_CCm: RigidTransform | None = None,
     ) -> None:
         """Creates the system.
 
@@ -84,6 +85,8 @@ class CameraPose(LeafSystem):
             kinematics: Of the arm, with the camera's modelled mount.
             period: Time between samples of q, s.
             length: How far back samples are kept, s.
+            X_CCm: The calibrated camera frame, seen from where the model has it; None =
+                as modelled.
 
         Raises:
             ValueError: `period` is not positive, or `length` shorter than it.
@@ -95,6 +98,7 @@ class CameraPose(LeafSystem):
                 f"got {period!r} and {length!r}."
             )
         self._kinematics = kinematics
+        self._X_CCm = RigidTransform() if X_CCm is None else X_CCm
         self._length = length
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 2 * _NQ)
@@ -135,7 +139,8 @@ class CameraPose(LeafSystem):
                 f"reach back {now - history.time[0]:.3f} s."
             )
         R_WC, p_WC = self._kinematics.camera_poses(history.at(time)[np.newaxis])
-        output.set_value(RigidTransform(RotationMatrix(R_WC[0]), p_WC[0]))
+        X_WC = RigidTransform(RotationMatrix(R_WC[0]), p_WC[0])
+        output.set_value(X_WC @ self._X_CCm)
 
     def _UpdateHistory(self, context: Context, state: State) -> EventStatus:
         index = int(self._history_index)

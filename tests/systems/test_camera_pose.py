@@ -55,6 +55,16 @@ def test_pose_is_that_of_the_picture_not_of_now(image_time):
     assert pose(simulator).IsNearlyEqualTo(expected, 1e-9)
 
 
+def test_a_calibrated_mount_is_where_the_pose_is():
+    X_CCm = RigidTransform(RotationMatrix.MakeXRotation(0.01), [0.0, 0.002, 0.0])
+    dut = CameraPose(kinematics=ARM, X_CCm=X_CCm)
+    context = dut.CreateDefaultContext()
+    dut.GetInputPort("state").FixValue(context, np.zeros(10))
+    dut.GetInputPort("image_time").FixValue(context, [-1.0])
+    X_WC = dut.GetOutputPort("X_WC").Eval(context)
+    assert X_WC.IsNearlyEqualTo(yaw_pose(0.0) @ X_CCm, 1e-12)
+
+
 def test_before_the_first_picture_the_pose_is_now():
     simulator = make_simulator(-1.0)
     assert pose(simulator).IsNearlyEqualTo(yaw_pose(0.0), 1e-12)
