@@ -9,7 +9,10 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.config import Scenario
-from painter.diagrams.program_planner import MakeProgramPlanner
+from painter.diagrams.program_planner import (
+    MakeProgramPlanner,
+    MakeTransferPlanner,
+)
 from painter.diagrams.station import MakeStation
 from painter.planning.remainder import Remainder
 from painter.planning.tile import nominal_tile_pose
@@ -90,14 +93,8 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
     mover = add(
         "motion_planner",
         MotionPlanner(
-            kinematics=planner.kinematics,
-            limits=planner.limits,
-            checker=planner.checker,
-            tile=scenario.tile,
-            scan=scenario.scan,
-            motion=scenario.motion,
+            planner=MakeTransferPlanner(scenario, planner),
             cell=scenario.segmentation.cell,
-            standoff=scenario.raster.standoff,
             period=period,
         ),
     )

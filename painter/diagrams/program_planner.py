@@ -1,4 +1,4 @@
-"""The planner of a scenario's robot."""
+"""The planners of a scenario's robot."""
 
 from painter.config import Scenario
 from painter.diagrams.arm_model import (
@@ -8,6 +8,7 @@ from painter.diagrams.arm_model import (
     MakeCollisionChecker,
 )
 from painter.planning.program import ProgramPlanner
+from painter.planning.transfer import TransferPlanner
 
 
 def MakeProgramPlanner(scenario: Scenario) -> ProgramPlanner:
@@ -26,4 +27,24 @@ def MakeProgramPlanner(scenario: Scenario) -> ProgramPlanner:
         tip=scenario.gun.tip,
         raster=scenario.raster,
         motion=scenario.motion,
+    )
+
+
+def MakeTransferPlanner(
+    scenario: Scenario, programs: ProgramPlanner
+) -> TransferPlanner:
+    """Makes the planner of motions with the gun closed.
+
+    Args:
+        scenario: Gives tile and settings.
+        programs: Planner of programs for the same robot.
+    """
+    return TransferPlanner(
+        kinematics=programs.kinematics,
+        limits=programs.limits,
+        checker=programs.checker,
+        tile=scenario.tile,
+        scan=scenario.scan,
+        motion=scenario.motion,
+        standoff=scenario.raster.standoff,
     )

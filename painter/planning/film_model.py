@@ -224,7 +224,8 @@ class FilmModel:
         if lean == 0.0:
             column = math.floor(x_line / cell) + site.border
             first = min(max(column - reach, 0), count - 1)
-            new = site.steps[low:high, first : max(column + reach, 0) + 1].any(axis=1)
+            window = slice(first, max(column + reach, 0) + 1)
+            new: BoolArray = np.array(site.steps[low:high, window].any(axis=1))
             new[0] = True
             rows, back = rows[new], np.cumsum(new) - 1
         axis = (x_line + lean * site.y[rows])[:, None]

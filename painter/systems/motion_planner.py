@@ -2,27 +2,18 @@
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
-from pydrake.planning import CollisionChecker
 from pydrake.systems.framework import Context
 
 from painter.errors import PainterError
-from painter.planning.config import (
-    MotionConfig,
-    RasterConfig,
-    ScanConfig,
-    TileConfig,
-)
-from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.spray_path import Motion
 from painter.planning.tile import nominal_tile_pose
-from painter.planning.transfer import GOALS, plan_more_looks, plan_transfer
+from painter.planning.transfer import GOALS, TransferPlanner
 from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
 from painter.systems.values import StageResult
 from perception.config import SegmentationConfig, check_positive
 from perception.shadows import find_relief
-from perception.values import FloatArray, SurfaceMap, Wall
+from perception.values import SurfaceMap, Wall
 
 MORE_LOOKS = "more looks"
 
@@ -57,47 +48,28 @@ class MotionPlanner(Stage):
     def __init__(
         self,
         *,
-        kinematics: ArmKinematics,
-        limits: ArmLimits,
-        checker: CollisionChecker,
-        tile: TileConfig,
-        scan: ScanConfig,
-        motion: MotionConfig,
+        planner: TransferPlanner,
         cell: float = SegmentationConfig.cell,
         period: float,
-        standoff: float = RasterConfig.standoff,
     ) -> None:
         """Creates the stage.
 
         Args:
-            kinematics: Of the arm.
-            limits: Of its joints.
-            checker: Of the robot's cell: arm, frame and floor.
-            tile: Size of the tile, and where the job expects it.
-            scan: Settings of first sight and scan.
-            motion: Settings of the motion.
+            planner: Of the robot and its settings; before first sight and scan it makes
+                sure that the arm reaches the whole tile.
             cell: Of the grid on which the scan is looked at for shadows, m.
             period: Time between looks at the request, s.
-            standoff: Of the gun when it paints, m; before first sight and scan it is
-                made sure that the arm reaches the whole tile with it.
 
         Raises:
             ValueError: A setting is out of bounds.
         """
-        check_positive("motion_planner", cell=cell, standoff=standoff, period=period)
-        for config in (tile, scan, motion):
+        check_positive(
+            "motion_planner", cell=cell, standoff=planner.standoff, period=period
+        )
+        for config in (planner.tile, planner.scan, planner.motion):
             config.validate()
         super().__init__(stage="motion_planner", period=period)
-        self._X_WT_expected = nominal_tile_pose(tile)
-        self._settings = {
-            "kinematics": kinematics,
-            "limits": limits,
-            "checker": checker,
-            "tile": tile,
-            "scan": scan,
-            "motion": motion,
-        }
-        self._standoff = standoff
+        self._planner = planner
         self._cell = cell
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 10)
@@ -113,19 +85,12 @@ class MotionPlanner(Stage):
                 f"{', '.join((*GOALS, MORE_LOOKS))}, got {goal!r}."
             )
         wall = EvalAs(self._wall_port, context, StageResult).value
-        X_WT = wall.X_WT if isinstance(wall, Wall) else self._X_WT_expected
+        tile = self._planner.tile
+        X_WT = wall.X_WT if isinstance(wall, Wall) else nominal_tile_pose(tile)
         q0 = np.array(self._state_port.Eval(context)[:5])
-        if goal == MORE_LOOKS:
-            return self._MoreLooks(context, X_WT, q0)
-        return plan_transfer(
-            goal, q0, X_WT=X_WT, standoff=self._standoff, **self._settings
-        )
-
-    def _MoreLooks(
-        self, context: Context, X_WT: RigidTransform, q0: FloatArray
-    ) -> Motion | None:
+        if goal != MORE_LOOKS:
+            return self._planner.plan(goal, q0, X_WT)
         surface_map = EvalAs(self._map_port, context, SurfaceMap)
-        tile = self._settings["tile"]
         X_TW = X_WT.inverse()
         relief = find_relief(
             X_TW @ surface_map.p_WQs,
@@ -134,4 +99,4 @@ class MotionPlanner(Stage):
             height=tile.height,
             cell=self._cell,
         )
-        return plan_more_looks(q0, relief=relief, X_WT=X_WT, **self._settings)
+        return self._planner.more_looks(q0, relief, X_WT)

@@ -6,7 +6,7 @@ import pytest
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
 from painter.planning.more_looks import look_poses, more_looks
 from painter.planning.tile import nominal_tile_pose
-from painter.planning.transfer import plan_more_looks
+from painter.planning.transfer import TransferPlanner
 from perception.shadows import Relief
 
 SCAN = ScanConfig()
@@ -86,16 +86,9 @@ def test_there_are_no_looks_for_nothing(robot):
 def test_the_arm_keeps_clear_of_what_the_scan_has_found(robot):
     tile = TileConfig()
     (q0,) = robot.linker().gun.solve(END_T)
-    settings = {
-        "X_WT": nominal_tile_pose(tile),
-        "kinematics": robot.kinematics,
-        "limits": robot.limits,
-        "checker": robot.checker,
-        "tile": tile,
-        "scan": SCAN,
-        "motion": MotionConfig(),
-    }
-    motion = plan_more_looks(q0, relief=make_relief(LEFT, UNDER), **settings)
+    X_WT = nominal_tile_pose(tile)
+    dut = TransferPlanner(**vars(robot), tile=tile, scan=SCAN, motion=MotionConfig())
+    motion = dut.more_looks(q0, make_relief(LEFT, UNDER), X_WT)
     _, p_WGs = robot.kinematics.gun_poses(motion.q)
     assert p_WGs[:, 0].max() <= 1.05 - TOP - MotionConfig().clearance
     np.testing.assert_allclose(motion.q[0], q0)
@@ -103,5 +96,5 @@ def test_the_arm_keeps_clear_of_what_the_scan_has_found(robot):
     # The gun stands half a metre off the wall: there is no room for a thing as high.
     high = make_relief(LEFT)
     high = Relief(height=4.0 * high.height, hidden=high.hidden, cell=high.cell)
-    assert plan_more_looks(q0, relief=high, **settings) is None
-    assert plan_more_looks(q0, relief=make_relief(), **settings) is None
+    assert dut.more_looks(q0, high, X_WT) is None
+    assert dut.more_looks(q0, make_relief(), X_WT) is None

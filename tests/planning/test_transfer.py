@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from painter.errors import CollisionError, ReachError
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
 from painter.planning.tile import nominal_tile_pose
-from painter.planning.transfer import plan_transfer
+from painter.planning.transfer import TransferPlanner
 
 MOTION = MotionConfig()
 HOME = np.deg2rad(MOTION.home_deg)
@@ -17,18 +17,10 @@ FOLDED = np.array([0.0, -1.9, 2.6, -0.7, 0.0])
 
 def plan(robot, goal, q0, *, tile=None, X_WT=None):
     tile = tile or TileConfig()
-    return plan_transfer(
-        goal,
-        q0,
-        X_WT=X_WT or nominal_tile_pose(tile),
-        standoff=0.3,
-        kinematics=robot.kinematics,
-        limits=robot.limits,
-        checker=robot.checker,
-        tile=tile,
-        scan=ScanConfig(),
-        motion=MOTION,
+    planner = TransferPlanner(
+        **vars(robot), tile=tile, scan=ScanConfig(), motion=MOTION, standoff=0.3
     )
+    return planner.plan(goal, q0, X_WT or nominal_tile_pose(tile))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from painter.planning.config import MotionConfig, ScanConfig, TileConfig
 from painter.planning.gun_path import SquareGun
 from painter.planning.spray_path import Motion
 from painter.planning.tile import nominal_tile_pose
+from painter.planning.transfer import TransferPlanner
 from painter.systems.motion_planner import MotionPlanner
 from painter.systems.values import StageRequest, StageResult
 from perception.values import SurfaceMap, Wall
@@ -26,15 +27,15 @@ HOME = np.deg2rad(MotionConfig().home_deg)
 
 def make_planner(**tile):
     plant = MakeArmPlant(DIRECTIVES)
-    return MotionPlanner(
+    planner = TransferPlanner(
         kinematics=GetArmKinematics(plant),
         limits=GetArmLimits(plant),
         checker=MakeCollisionChecker(DIRECTIVES, clearance=0.04),
         tile=TileConfig(**tile),
         scan=ScanConfig(),
         motion=MotionConfig(),
-        period=0.1,
     )
+    return MotionPlanner(planner=planner, period=0.1)
 
 
 @pytest.fixture(scope="module")
