@@ -178,6 +178,12 @@ class Scenario:
         ):
             if len(getattr(self.wall_camera, name)) != 3:
                 raise ValueError(f"wall_camera.{name} must have 3 numbers.")
+        fastest = self.motion.limit_share * self.motion.nozzle_speed
+        if self.raster.speed > fastest:
+            raise ValueError(
+                f"raster.speed must be <= {fastest:g} m/s, motion.limit_share of "
+                f"motion.nozzle_speed, got {self.raster.speed!r}."
+            )
         for number, zone in enumerate(self.raster.zones):
             name = f"raster.zones[{number}]"
             zone.validate(name)

@@ -79,6 +79,7 @@ def test_a_later_override_wins():
         ("raster.speed=fast", "fast"),
         ("raster.speed=-1", "raster.speed"),
         ("raster.speed=.nan", "raster.speed"),
+        ("raster.speed=2.4", "motion.nozzle_speed"),
         ("tile.width=0", "tile.width"),
         ("arm.encoder_bits=99", "arm.encoder_bits"),
         ("arm.faults=[{joint: 6}]", "arm.faults"),

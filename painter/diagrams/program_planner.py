@@ -18,9 +18,13 @@ def MakeProgramPlanner(scenario: Scenario) -> ProgramPlanner:
         scenario: Gives the robot's directives, tip and settings.
     """
     plant = MakeArmPlant(scenario.directives)
+    kinematics = GetArmKinematics(plant)
+    limits = GetArmLimits(plant)
     return ProgramPlanner(
-        kinematics=GetArmKinematics(plant),
-        limits=GetArmLimits(plant),
+        kinematics=kinematics,
+        limits=limits.replace(
+            nozzle=kinematics.nozzle, nozzle_speed=scenario.motion.nozzle_speed
+        ),
         checker=MakeCollisionChecker(
             scenario.directives, clearance=scenario.motion.clearance
         ),

@@ -131,8 +131,8 @@ def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
 
     Args:
         limits: Of the joints.
-        share: Of velocities, accelerations and torques; positions keep 0.02 rad off
-            their ends.
+        share: Of velocities, accelerations, torques and the nozzle's speed; positions
+            keep 0.02 rad off their ends.
     """
     return limits.replace(
         q_min=limits.q_min + _POSITION_MARGIN,
@@ -140,6 +140,7 @@ def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
         v_max=share * limits.v_max,
         a_max=share * limits.a_max,
         effort_max=share * limits.effort_max,
+        nozzle_speed=share * limits.nozzle_speed,
     )
 
 
@@ -205,7 +206,9 @@ def fastest_joint_blend(
 def keeps_limits(
     place: Callable[[FloatArray], FloatArray], duration: float, limits: ArmLimits
 ) -> bool:
-    """Tells whether a move keeps rates and torques, looked at as densely as executed.
+    """Tells whether a move keeps its limits, looked at as densely as executed.
+
+    These are rates and torques of the joints and the speed of the nozzle.
 
     A search over many durations looks at few samples of each, between which a peak may
     hide; what it finds is looked at once more.
@@ -222,6 +225,11 @@ def keeps_limits(
     a = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2
     with np.errstate(invalid="ignore"):
         if not ((np.abs(v) <= limits.v_max) & (np.abs(a) <= limits.a_max)).all():
+            return False
+    if limits.nozzle is not None:
+        p_WGs = limits.nozzle(q)
+        speed = np.linalg.norm(p_WGs[2:] - p_WGs[:-2], axis=1) / (2.0 * step)
+        if speed.max() > limits.nozzle_speed:
             return False
     if limits.torques is None:
         return True

@@ -22,6 +22,8 @@ _MOUNT_TOLERANCE = 1e-9
 # Joint torques (n, 5), N m, that positions, velocities and accelerations (n, 5) each,
 # rad and s, take.
 TorqueModel = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+# Nozzle (n, 3) in W, m, at joint angles (n, 5), rad.
+NozzleModel = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,8 @@ class ArmLimits(FrozenValue):
         a_max: (5,) rad/s².
         effort_max: (5,) N m at the joint.
         torques: What a motion takes of them; None = not looked at.
+        nozzle_speed: Most speed of the nozzle in W, m/s.
+        nozzle: Where it is; None = its speed is not looked at.
     """
 
     q_min: FloatArray
@@ -43,6 +47,8 @@ class ArmLimits(FrozenValue):
     a_max: FloatArray
     effort_max: FloatArray
     torques: TorqueModel | None = None
+    nozzle_speed: float = np.inf
+    nozzle: NozzleModel | None = None
 
     def contains(self, q: FloatArray) -> BoolArray:
         """Tells which rows of `q` (n, 5), rad, are finite and within the limits."""
@@ -123,6 +129,11 @@ class ArmKinematics(FrozenValue):
     def gun_poses(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns R_WG (n, 3, 3) and p_WG (n, 3), m, for `q` (n, 5), rad."""
         return self._poses(q, self.X_LG)
+
+    def nozzle(self, q: FloatArray) -> FloatArray:
+        """Returns p_WG (n, 3), m, for `q` (n, 5), rad."""
+        _, p_WGs = self.gun_poses(q)
+        return p_WGs
 
     def camera_poses(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns R_WC (n, 3, 3) and p_WC (n, 3), m, for `q` (n, 5), rad."""

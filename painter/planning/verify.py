@@ -34,12 +34,12 @@ def verify_motion(
     space: ClearSpace,
     what: str,
 ) -> None:
-    """Checks joint limits, torques and clearance all along a motion.
+    """Checks the joints' and the nozzle's limits and clearance all along a motion.
 
     Args:
         motion: As it will be executed.
         kinematics: Of the arm.
-        limits: Of the joints.
+        limits: Of the joints and the nozzle.
         limit_share: Share of their velocities, accelerations and torques that plans
             may use.
         space: What must be kept clear of.
@@ -47,7 +47,7 @@ def verify_motion(
 
     Raises:
         MotionLimitError: A joint leaves its position, velocity, acceleration or torque
-            limit; names joint, time, value and bound.
+            limit, or the nozzle its speed; names joint, time, value and bound.
         CollisionError: The arm comes nearer than its clearance; names bodies and time.
     """
     share = limit_share * _RATE_TOLERANCE
@@ -65,6 +65,13 @@ def verify_motion(
         torques = limits.torques(q[few], v[few], a[few])
         bounds = share * limits.effort_max
         _require_within(f"{what}: torque", "N m", time[few], torques, bounds)
+    if limits.nozzle is not None:
+        # Between neighbouring samples: what lies between them is no faster but by the
+        # tolerance.
+        gaps = np.linalg.norm(np.diff(limits.nozzle(motion.q), axis=0), axis=1)
+        speed = gaps / np.diff(motion.time)
+        bound = share * limits.nozzle_speed
+        _require_within(f"{what}: nozzle speed", "m/s", motion.time, speed, bound)
     # Plans look at other samples than these.
     seen = _spread(motion.q, kinematics)
     space.require(

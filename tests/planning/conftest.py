@@ -41,7 +41,7 @@ class Robot:
             "raster": RasterConfig(),
             "motion": MotionConfig(),
         }
-        return ProgramPlanner(**vars(self), **(defaults | settings))
+        return ProgramPlanner(**(vars(self) | defaults | settings))
 
     def linker(self, *boxes: ObstacleBox, X_WT: RigidTransform | None = None) -> Linker:
         """A linker before the expected wall, with `boxes` on it."""

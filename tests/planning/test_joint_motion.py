@@ -86,7 +86,41 @@ def test_planning_limits_scale_rates_and_hold_back_from_the_ends():
     planned = planning_limits(LIMITS, 0.5)
     np.testing.assert_allclose(planned.v_max, 0.5 * LIMITS.v_max)
     np.testing.assert_allclose(planned.a_max, 0.5 * LIMITS.a_max)
+    assert planning_limits(LIMITS.replace(nozzle_speed=2.0), 0.5).nozzle_speed == 1.0
     np.testing.assert_allclose(planned.q_max, LIMITS.q_max - 0.02)
+
+
+def test_the_nozzle_keeps_its_speed_where_the_joints_would_allow_more():
+    """A yaw by 1.5 rad carries the nozzle round a circle of 1.2 m.
+
+    Speeding up and slowing down for as long each as a move that just reaches its speed
+    needs, it takes one way over its speed and that time.
+    """
+    radius, speed = 1.2, 0.9
+
+    def nozzle(q):
+        return radius * np.column_stack(
+            [np.cos(q[:, 0]), np.sin(q[:, 0]), 0.0 * q[:, 0]]
+        )
+
+    q1 = Q0 + [1.5, 0.0, 0.0, 0.0, 0.0]
+    free = rest_to_rest(Q0, q1, LIMITS)
+    dut = rest_to_rest(Q0, q1, LIMITS.replace(nozzle=nozzle, nozzle_speed=speed))
+    time = np.linspace(0.0, dut.duration, 4001)
+    fastest = np.abs(np.gradient(nozzle(dut.q(time)), time, axis=0))
+    assert np.linalg.norm(fastest, axis=1).max() <= speed * (1.0 + 1e-6)
+    assert dut.duration > free.duration
+    # Slowed as a whole, in steps of 5 %: the cruise is that near to the bound.
+    peak = radius * 1.5 / (dut.speed_up + dut.cruise)
+    assert speed / 1.05 <= peak <= speed
+    blend = fastest_joint_blend(
+        MovingState.at_rest(Q0),
+        MovingState.at_rest(q1),
+        LIMITS.replace(nozzle=nozzle, nozzle_speed=speed),
+    )
+    time = np.linspace(0.0, blend.duration, 4001)
+    v = np.gradient(nozzle(blend.q(time)), time, axis=0)
+    assert 0.9 * speed < np.linalg.norm(v, axis=1).max() <= speed * 1.001
 
 
 def test_chain_is_smooth_and_passes_through_its_segments():

@@ -151,6 +151,37 @@ def test_verification_finds_a_motion_that_is_too_fast(robot, program):
         )
 
 
+def test_a_program_keeps_the_speed_that_its_nozzle_may_have(robot, make_wall):
+    wall = make_wall(LOW_BOX)
+    strokes = robot.planner().strokes(wall)
+    free = plan(robot, wall, strokes=strokes)
+    limits = robot.limits.replace(nozzle=robot.kinematics.nozzle, nozzle_speed=0.8)
+    planner = robot.planner(limits=limits)
+    dut = planner.program(strokes, wall, HOME)
+    speeds = []
+    for program in (free, dut):
+        time = np.arange(0.0, program.motion.duration, 0.002)
+        q = program.motion.trajectory.vector_values(time).T
+        p_WGs = robot.kinematics.nozzle(q)
+        speeds.append(np.linalg.norm(np.gradient(p_WGs, 0.002, axis=0), axis=1).max())
+    assert speeds[0] > 0.9
+    # 0.9 of it, and what the spline through the samples swings beyond.
+    assert speeds[1] <= 0.9 * 0.8 * 1.01
+    assert dut.motion.duration > free.motion.duration
+    assert sum(s.length for s in dut.strokes) == pytest.approx(
+        sum(s.length for s in free.strokes), rel=0.01
+    )
+    with pytest.raises(MotionLimitError, match=r"free: nozzle speed is .* m/s at .* s"):
+        verify_motion(
+            free.motion,
+            kinematics=robot.kinematics,
+            limits=limits,
+            limit_share=0.9,
+            space=robot.linker().space,
+            what="free",
+        )
+
+
 def covered(strokes):
     """Lengths of wall that are sprayed, by line and stand-off."""
     lengths = {}
