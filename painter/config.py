@@ -184,6 +184,12 @@ class Scenario:
                 f"raster.speed must be <= {fastest:g} m/s, motion.limit_share of "
                 f"motion.nozzle_speed, got {self.raster.speed!r}."
             )
+        drying = (self.raster.coats - 1) * self.raster.flash_off
+        if drying >= self.cycle.time_limit:
+            raise ValueError(
+                f"cycle.time_limit must be > {drying:g} s, raster.flash_off of all "
+                f"coats but the last, got {self.cycle.time_limit!r}."
+            )
         for number, zone in enumerate(self.raster.zones):
             name = f"raster.zones[{number}]"
             zone.validate(name)

@@ -8,6 +8,8 @@ import math
 
 from perception.config import check_positive
 
+MOST_COATS = 4
+
 
 @dataclasses.dataclass(kw_only=True)
 class TileConfig:
@@ -140,6 +142,10 @@ class RasterConfig:
             wall beside edges; False = the raster alone.
         cut_in_standoff: Nearest stand-off of such strokes, m; the fan is narrower by
             as much. None are made where it is not below `standoff`.
+        coats: Coats that the film is laid in, each with the same share of it; more
+            than one are cut in.
+        flash_off: Rest between two coats, for which the first dries, s; what a paint
+            wants stands in its data sheet.
         direction: Of the strokes; "vertical" alone can be.
         zones: What the operator wants painted or left.
     """
@@ -153,6 +159,8 @@ class RasterConfig:
     wall_share: float = 0.5
     cut_in: bool = True
     cut_in_standoff: float = 0.10
+    coats: int = 1
+    flash_off: float = 60.0
     direction: str = "vertical"
     zones: list[ZoneConfig] = dataclasses.field(default_factory=list)
 
@@ -167,6 +175,19 @@ class RasterConfig:
             )
         for number, zone in enumerate(self.zones):
             zone.validate(f"raster.zones[{number}]")
+        if not 1 <= self.coats <= MOST_COATS:
+            raise ValueError(
+                f"raster.coats must be 1 to {MOST_COATS}, so that the valve can dose "
+                f"them, got {self.coats!r}."
+            )
+        if self.coats > 1 and not self.cut_in:
+            raise ValueError(
+                f"raster.coats must be 1 without raster.cut_in, got {self.coats!r}."
+            )
+        if not 0.0 <= self.flash_off < math.inf:
+            raise ValueError(
+                f"raster.flash_off must be >= 0 s, got {self.flash_off!r}."
+            )
         if not 0.08 <= self.cut_in_standoff < 1.0:
             raise ValueError(
                 "raster.cut_in_standoff must be 0.08 to 1 m, got "

@@ -22,7 +22,7 @@ _SPACING = 0.02  # m, between candidate lines ...
 _SPACING_IN_SPOTS = 0.01  # ... and where only some spots are looked at.
 _ROUNDS = 10
 # Flow of candidates, as share of what keeps the film's thickness at their stand-off.
-_FLOWS = np.array([0.0, 0.6, 0.75, 0.9, 1.05, 1.25])
+_FLOWS = np.array([0.6, 0.75, 0.9, 1.05, 1.25])
 _THIN = 0.9  # Film below which a line is worth looking at.
 _APART = 1.6  # Half fans between lines that are taken at once.
 _MOSTLY_EDGE = 4.0  # m of edge a m² of wall.
@@ -65,8 +65,14 @@ def find_cut_ins(
         (0.0, places),
         *leaning_lines(site, 2.0 * half_axes(tip, near)[0], spacing),
     ]
+    flows = {
+        standoff: np.append(
+            0.0, np.maximum(_FLOWS * standoff / raster.standoff, fit.least_flow)
+        )
+        for standoff in standoffs
+    }
     candidates = [
-        _Candidate(float(place), lean, standoff, room)
+        _Candidate(float(place), lean, standoff, room, flows[standoff])
         for standoff, (lean, x) in itertools.product(standoffs, lines)
         for place, room in zip(x, fit.room(x, standoff, lean).T, strict=True)
     ]
@@ -112,9 +118,16 @@ def _meet(spans: list[Span], a: float, other_a: float, others: list[Span]) -> bo
 class _Candidate:
     """A line on which to cut in, and what each flow on each row would cost."""
 
-    def __init__(self, x: float, lean: float, standoff: float, room: BoolArray) -> None:
+    def __init__(
+        self,
+        x: float,
+        lean: float,
+        standoff: float,
+        room: BoolArray,
+        flows: FloatArray,
+    ) -> None:
         self.x, self.lean, self.standoff = x, lean, standoff
-        self._room = room
+        self._room, self._flows = room, flows
         self._film: FloatArray | None = None
         self._table: FloatArray | None = None
 
@@ -147,7 +160,7 @@ class _Candidate:
         rows = thin.any(axis=1)
         if rows.sum() * site.cell < raster.min_stroke:
             return None
-        flows = self.flows(raster)
+        flows = self._flows
         table = np.zeros((rows.size, flows.size))
         trial = film[rows] + flows[:, None, None] * line.film[rows]
         cells = FilmCost.coarse()(trial, wanted[rows], site.clean[rows, window])
@@ -157,13 +170,8 @@ class _Candidate:
         table[:, 1:] += (stroke_cost(1.0) - stroke_cost(0.0)) * site.cell
         return table
 
-    def flows(self, raster: RasterConfig) -> FloatArray:
-        """Returns the flows that are tried."""
-        return np.asarray(_FLOWS * self.standoff / raster.standoff)
-
     def spans(self, levels: IntArray, site: Site, raster: RasterConfig) -> list[Span]:
         """Returns the spans of a choice of flows (ny,) by their number."""
-        flows = self.flows(raster)
         ends = np.flatnonzero(np.diff(levels, prepend=0, append=0) != 0)
         return [
             Span(
@@ -171,7 +179,7 @@ class _Candidate:
                 (a - site.border) * site.cell,
                 (b - site.border) * site.cell,
                 self.standoff,
-                float(min(flows[levels[a]], 1.0)),
+                float(min(self._flows[levels[a]], 1.0)),
                 self.lean,
             )
             for a, b in itertools.pairwise(ends)

@@ -86,8 +86,13 @@ def plan_stations(
         Stations in order of execution: row by row from below, to and fro.
 
     Raises:
-        ValueError: The wall or the tile is too small for a line or an overlap.
+        ValueError: The wall or the tile is too small for a line or an overlap, or
+            several coats are wanted.
     """
+    if raster.coats > 1:
+        raise ValueError(
+            f"raster.coats must be 1 for a wall of stations, got {raster.coats!r}."
+        )
     pitch = nominal_pitch(width, tip=tip, raster=raster)
     lines = round(width / pitch)
     in_tile = math.floor(tile.width / pitch + 1e-9)

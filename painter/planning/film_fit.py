@@ -86,6 +86,7 @@ class FilmFit:
         *,
         raster: RasterConfig,
         film: FloatArray | None = None,
+        least_flow: float = LEAST_FLOW,
     ) -> None:
         """Begins with none.
 
@@ -94,8 +95,10 @@ class FilmFit:
             cost: Of the film.
             raster: Gives stand-offs and the shortest stroke.
             film: (ny, nx) of the site, what is there already; None = nothing.
+            least_flow: That a span may have.
         """
         site = model.site
+        self.least_flow = least_flow
         self.film: FloatArray = np.zeros(site.wanted.shape)
         if film is not None:
             self.film += film
@@ -191,7 +194,7 @@ class FilmFit:
             trial = trial._replace(flow=span.flow * trial.standoff / span.standoff)
             if not raster.cut_in_standoff <= trial.standoff <= raster.standoff:
                 return None
-        if not LEAST_FLOW <= trial.flow <= 1.0 + 1e-9:
+        if not self.least_flow <= trial.flow <= 1.0 + 1e-9:
             return None
         if trial.high - trial.low < raster.min_stroke:
             return None

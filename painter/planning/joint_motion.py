@@ -126,6 +126,28 @@ class JointTravel(FrozenValue):
         return np.where(t < ramp, rising, np.where(rest > ramp, steady, falling))
 
 
+@dataclass(frozen=True, eq=False)
+class Stand(FrozenValue):
+    """A `Segment` that stands still.
+
+    Attributes:
+        q0: (5,) rad, where.
+        duration: s.
+    """
+
+    q0: FloatArray
+    duration: float
+
+    @property
+    def knots(self) -> FloatArray:
+        """See `Segment.knots`."""
+        return np.array([0.0, self.duration])
+
+    def q(self, time: FloatArray) -> FloatArray:
+        """See `Segment.q`."""
+        return np.tile(self.q0, (np.size(time), 1))
+
+
 def planning_limits(limits: ArmLimits, share: float) -> ArmLimits:
     """Returns what a plan may use of the joints' limits.
 

@@ -9,13 +9,12 @@ is much better than the one that takes what covers most.
 """
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 
 from painter.errors import CollisionError
 from painter.planning.config import ScanConfig
-from painter.planning.joint_motion import Segment, rest_to_rest
+from painter.planning.joint_motion import Segment, Stand, rest_to_rest
 from painter.planning.linker import Linker, end_q
 from painter.planning.scan_path import (
     BASELINE,
@@ -25,34 +24,12 @@ from painter.planning.scan_path import (
 )
 from perception.shadows import Relief
 from perception.sight import seen_from
-from perception.values import FloatArray, FrozenValue
+from perception.values import FloatArray
 
 _STEP = 0.1  # m, between the places that are tried.
 _DISTANCE_SHARES = (1.0, 0.9, 0.8)  # Of the scan's, of these places from the wall.
 _LEAST_GAIN = 5e-4  # m² of hidden wall that are worth a look.
 _INSIDE = 0.02  # m, that a place on the wall lies inside the picture at least.
-
-
-@dataclass(frozen=True, eq=False)
-class Stand(FrozenValue):
-    """A `Segment` that stands still.
-
-    Attributes:
-        q0: (5,) rad, where.
-        duration: s.
-    """
-
-    q0: FloatArray
-    duration: float
-
-    @property
-    def knots(self) -> FloatArray:
-        """See `Segment.knots`."""
-        return np.array([0.0, self.duration])
-
-    def q(self, time: FloatArray) -> FloatArray:
-        """See `Segment.q`."""
-        return np.tile(self.q0, (np.size(time), 1))
 
 
 def more_looks(

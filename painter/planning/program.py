@@ -16,7 +16,13 @@ from painter.planning.clear_strokes import (
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.film_model import Site
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
-from painter.planning.joint_motion import Segment, chain, planning_limits, start_times
+from painter.planning.joint_motion import (
+    Segment,
+    Stand,
+    chain,
+    planning_limits,
+    start_times,
+)
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.linker import Linker, end_q
 from painter.planning.obstacles import ClearSpace, segmentation_boxes
@@ -104,7 +110,7 @@ class ProgramPlanner(FrozenValue):
         """Plans the motion that makes given strokes.
 
         Args:
-            wanted: Strokes in T, in any order and direction.
+            wanted: Strokes in T, in any order and direction; coats follow one another.
             segmentation: Of the tile; what stands before the wall is kept clear of.
             q0: (5,) rad, where the arm stands, at rest.
 
@@ -133,12 +139,9 @@ class ProgramPlanner(FrozenValue):
             q_home=np.deg2rad(motion.home_deg),
         )
         clear, skipped = clear_strokes(wanted, linker, self.raster.min_stroke)
-        rests = []
-        for q in (q0, linker.q_home):
-            _, p_WGs = self.kinematics.gun_poses(q[None])
-            rests.append(gun.place(p_WGs[0]))
-        ordered = order_strokes(clear, *rests)
-        path, strokes, passes, unlinked = _linked(ordered, q0, linker)
+        path, strokes, passes, unlinked = _coats(
+            clear, q0, linker, self.raster.flash_off
+        )
         starts = start_times(path)[:-1]
         flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
         program = PaintProgram(
@@ -199,6 +202,33 @@ def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke,
 # The segments; the strokes that could be come to; the index of each one's segment; and
 # the strokes that could not, with the reason.
 _Links = tuple[list[Segment], tuple[Stroke, ...], list[int], list[SkippedStroke]]
+
+
+def _coats(
+    strokes: Sequence[Stroke], q0: FloatArray, linker: Linker, flash_off: float
+) -> _Links:
+    """Orders and joins strokes coat by coat; the arm rests at home between them."""
+    path: list[Segment] = []
+    done: list[Stroke] = []
+    passes: list[int] = []
+    skipped: list[SkippedStroke] = []
+    gun, q = linker.gun, q0
+    for coat in sorted({stroke.coat for stroke in strokes}) or [1]:
+        if path and flash_off > 0.0:
+            path.append(Stand(q, flash_off))
+        rests = [
+            gun.place(p_WG)
+            for p_WG in gun.kinematics.nozzle(np.stack([q, linker.q_home]))
+        ]
+        of_coat = [stroke for stroke in strokes if stroke.coat == coat]
+        ordered = order_strokes(of_coat, *rests)
+        segments, sprayed, of_path, unlinked = _linked(ordered, q, linker)
+        passes += [len(path) + index for index in of_path]
+        path += segments
+        done += sprayed
+        skipped += unlinked
+        q = linker.q_home
+    return path, tuple(done), passes, skipped
 
 
 def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> _Links:

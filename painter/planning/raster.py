@@ -15,10 +15,16 @@ from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.cut_in import find_cut_ins
 from painter.planning.deposition import mean_film
 from painter.planning.film_cost import FilmCost
-from painter.planning.film_fit import FilmFit, Span
+from painter.planning.film_fit import LEAST_FLOW, FilmFit, Span
 from painter.planning.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
-from painter.planning.stroke_lines import nominal_pitch, place_lines, wall_share
+from painter.planning.stroke_lines import (
+    EDGE_FLOW,
+    lines_between,
+    nominal_pitch,
+    place_lines,
+    wall_share,
+)
 from painter.planning.zones import in_zones
 from perception.values import BoolArray, FloatArray
 
@@ -44,7 +50,8 @@ def plan_strokes(
     Without cut-in, the gun is on where at least `raster.wall_share` of the fan's flow
     lands on wall that is to be painted, and `raster.lead` beyond both ends of that.
     With it, strokes of the same lines and narrower ones beside edges are fitted to the
-    film that they leave.
+    film that they leave; every coat lays the same share of it, every second one from
+    lines half way between those of the others.
 
     Args:
         mask: (ny, nx) bool, True = to be painted, row 0 at the bottom of the tile.
@@ -55,8 +62,8 @@ def plan_strokes(
             seen; None = a plane. For cut-in.
 
     Returns:
-        Strokes from the left; none where nothing is to be painted. Without cut-in they
-        go up and down in turn, else all upwards.
+        Strokes from the left, coat by coat; none where nothing is to be painted.
+        Without cut-in they go up and down in turn, else all upwards.
 
     Raises:
         ValueError: The mask is not a 2-D array of bool.
@@ -72,12 +79,51 @@ def plan_strokes(
     lines = place_lines(paintable, cell, tip=tip, raster=raster)
     if not raster.cut_in:
         return _strokes_on(lines, paintable, cell, tip=tip, raster=raster)
-    nominal = raster_film(mask.shape[1] * cell, tip=tip, raster=raster)
     site = Site.of_tile(paintable, cell, height)
+    # Coats alternate between the lines and those half way between them.
+    width = mask.shape[1] * cell
+    phases = (lines, lines_between(lines, width))[: raster.coats]
+    plans = [
+        _fitted(phase, site, width, number, tip=tip, raster=raster)
+        for number, phase in enumerate(phases)
+    ]
+    return tuple(
+        stroke.replace(flow=stroke.flow / raster.coats, coat=coat + 1)
+        for coat in range(raster.coats)
+        for stroke in plans[coat % len(plans)]
+    )
+
+
+def _fitted(
+    lines: FloatArray,
+    site: Site,
+    width: float,
+    phase: int,
+    *,
+    tip: TipConfig,
+    raster: RasterConfig,
+) -> tuple[Stroke, ...]:
+    """Returns the strokes that leave all of the film from one set of lines.
+
+    Args:
+        lines: (n,) m, x of the raster's lines in T.
+        site: The tile and its margin.
+        width: Of the tile, m.
+        phase: 0 for the raster's own lines, 1 for those between them.
+        tip: The spray tip.
+        raster: Settings of the raster.
+    """
+    nominal = raster_film(width, tip=tip, raster=raster)
     model = FilmModel(site, tip=tip, speed=raster.speed, nominal=nominal)
-    fit = FilmFit(model, FilmCost.fine(site), raster=raster)
+    fit = FilmFit(
+        model,
+        FilmCost.fine(site),
+        raster=raster,
+        least_flow=raster.coats * LEAST_FLOW,
+    )
     for span in _body_spans(lines, fit, model, raster=raster):
-        fit.add(span)
+        at_edge = phase and span.x in (lines[0], lines[-1])
+        fit.add(span._replace(flow=EDGE_FLOW) if at_edge else span)
     if raster.cut_in_standoff < raster.standoff:
         find_cut_ins(fit, model, tip=tip, raster=raster)
     fit.fit()

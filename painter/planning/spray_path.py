@@ -23,6 +23,7 @@ class Stroke(FrozenValue):
         column: Number of the line it lies on, from the left.
         standoff: Nozzle to wall, m; nearer, the fan is narrower.
         flow: Share of the tip's nominal flow, above 0 up to 1.
+        coat: Number of the coat that it belongs to, from 1.
     """
 
     start_T: FloatArray
@@ -32,6 +33,7 @@ class Stroke(FrozenValue):
     column: int
     standoff: float = 0.30
     flow: float = 1.0
+    coat: int = 1
 
     @property
     def length(self) -> float:

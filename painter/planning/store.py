@@ -140,6 +140,7 @@ def _stroke_fields(stroke: Stroke) -> dict[str, Any]:
         "column": stroke.column,
         "standoff": stroke.standoff,
         "flow": stroke.flow,
+        "coat": stroke.coat,
     }
 
 
@@ -152,4 +153,5 @@ def _stroke(fields: dict[str, Any]) -> Stroke:
         column=int(fields["column"]),
         standoff=float(fields["standoff"]),
         flow=float(fields["flow"]),
+        coat=int(fields["coat"]),
     )

@@ -35,6 +35,9 @@ _CLOSEST = 40
 _PITCH_SLACK = 0.02
 
 
+EDGE_FLOW = 0.55  # Share of the nominal flow; see `lines_between`.
+
+
 def widest_pitch(tip: TipConfig, raster: RasterConfig) -> float:
     """Returns the pitch that strokes must not exceed, m."""
     return raster.overlap_pitch or best_pitch(tip, raster.standoff)
@@ -106,6 +109,25 @@ def place_lines(
     gaps = np.arange(_CLOSEST, widest + 1)
     path = _shortest_path(_OVERSPRAY_WEIGHT * spill, bare, gaps)
     return np.asarray(lines[path])
+
+
+def lines_between(lines: FloatArray, width: float) -> FloatArray:
+    """Returns lines half way between those of a raster, for every second coat.
+
+    Beside the tile's left and right edge there is one more each, sprayed with
+    `EDGE_FLOW`: half way between the edge and the raster's own first line it does for
+    the line on the edge itself, which would spray half of its paint past it.
+
+    Args:
+        lines: (n,) m, ascending x of the raster's lines in T.
+        width: Of the tile, m.
+
+    Returns:
+        (n + 1,) m.
+    """
+    middles = 0.5 * (lines[1:] + lines[:-1])
+    edges = 0.5 * lines[0], 0.5 * (lines[-1] + width)
+    return np.concatenate([edges[:1], middles, edges[1:]])
 
 
 def _shortest_path(spill: FloatArray, bare: "_BareWall", gaps: IntArray) -> list[int]:

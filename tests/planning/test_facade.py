@@ -114,6 +114,12 @@ def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):
     )
 
 
+def test_stations_have_one_coat():
+    raster = RasterConfig(coats=2)
+    with pytest.raises(ValueError, match=r"raster\.coats must be 1 .* got 2"):
+        plan_stations(5.0, 2.0, tile=TileConfig(), tip=TipConfig(), raster=raster)
+
+
 def test_a_tile_lower_than_two_overlaps_is_refused():
     with pytest.raises(ValueError, match="two overlaps"):
         plan_stations(4.0, 4.0, tile=TileConfig(height=0.3), tip=TIP, raster=RASTER)

@@ -10,7 +10,7 @@ from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.cut_in import _switch
 from painter.planning.deposition import half_axes, mean_film, predicted_film
 from painter.planning.film_cost import FilmCost, stroke_cost
-from painter.planning.film_fit import FilmFit, Span
+from painter.planning.film_fit import LEAST_FLOW, FilmFit, Span
 from painter.planning.film_model import FilmModel, Site
 from painter.planning.raster import fitted_strokes, plan_strokes, raster_film
 from painter.planning.spray_cone import SprayCone, SpraySurface
@@ -123,6 +123,23 @@ def test_a_leaning_stroke_leaves_what_rays_along_it_leave():
     assert film.sum() == pytest.approx(exact.sum(), rel=1e-3)
 
 
+def test_a_line_is_the_same_on_some_rows_as_on_all():
+    height = np.zeros((200, 200))
+    height[60:140:3, 90:104] = 0.05
+    dut = model(height == 0.0, height)
+    rows = slice(70, 95)
+    for lean in (0.0, 1e-6, 0.2):
+        whole, some = dut.line(0.9, 0.2, lean), dut.line(0.9, 0.2, lean, rows)
+        film = np.zeros(height.shape + 2 * np.array(dut.site.border))
+        film[:, slice(*whole.columns)] = whole.film
+        film[rows, slice(*some.columns)] -= some.film[rows]
+        assert np.abs(film[rows]).max() == 0.0
+        # Half the fan's thickness is that of the same line, too.
+        first = some.columns[0] - whole.columns[0]
+        cut = whole.thickness[rows, first : first + some.film.shape[1]]
+        np.testing.assert_array_equal(some.thickness[rows], cut)
+
+
 def test_a_leaning_stick_is_cut_in_along_its_sides():
     """A stick 4 cm wide and high that goes 1 to the right for 5 up.
 
@@ -204,6 +221,33 @@ def test_strokes_are_fitted_as_if_the_whole_site_were_weighed_each_time():
         fitted.append(dut.spans)
     assert len(fitted[0]) < len(spans)
     np.testing.assert_allclose(fitted[0], fitted[1], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("coats", [2, 3])
+def test_coats_share_the_film_and_alternate_their_lines(coats):
+    mask = wall()
+    raster = RasterConfig(coats=coats)
+    strokes = plan_strokes(mask, CELL, tip=TIP, raster=raster)
+    assert {stroke.coat for stroke in strokes} == set(range(1, coats + 1))
+    assert min(stroke.flow for stroke in strokes) >= LEAST_FLOW
+    dut = model(mask)
+    # One coat alone leaves its share, all over the tile.
+    for coat in range(1, coats + 1):
+        film = coats * dut.film([s for s in strokes if s.coat == coat])
+        assert np.mean(film[dut.site.wanted] >= 0.8) >= 0.97
+        assert film[dut.site.wanted].mean() == pytest.approx(1.0, abs=0.03)
+    # Away from the sides lines lie half way between those of the coat before.
+    first, second = (
+        np.array([s.start_T[0] for s in strokes if s.coat == coat]) for coat in (1, 2)
+    )
+    middles = 0.5 * (first[1:] + first[:-1])[3:-3]
+    nearest = np.abs(middles[:, None] - second).min(axis=1)
+    assert nearest.max() <= 0.005  # The fit's finest step across is 4 mm.
+    one = figures(mask, plan_strokes(mask, CELL, tip=TIP, raster=RASTER))
+    all_ = figures(mask, strokes)
+    assert all_["coverage"] >= one["coverage"]
+    assert all_["cv"] < one["cv"]
+    assert all_["overspray"] <= 0.04
 
 
 def test_switching_is_paid_for_once_a_run():

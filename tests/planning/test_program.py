@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 
 from painter.errors import InputError, MotionLimitError, ReachError
 from painter.planning.clear_strokes import has_run_out
-from painter.planning.config import MotionConfig
+from painter.planning.config import MotionConfig, RasterConfig
 from painter.planning.obstacles import ObstacleBox
 from painter.planning.program import strokes_from
 from painter.planning.spray_path import Motion, Stroke
@@ -149,6 +149,27 @@ def test_verification_finds_a_motion_that_is_too_fast(robot, program):
             space=robot.linker().space,
             what="rush",
         )
+
+
+def test_a_coat_dries_at_home_before_the_next(robot, make_wall):
+    raster = RasterConfig(coats=2, flash_off=45.0)
+    planner = robot.planner(raster=raster)
+    wall = make_wall(LOW_BOX)
+    dut = planner.program(planner.strokes(wall), wall, HOME)
+    coats = [stroke.coat for stroke in dut.strokes]
+    assert coats == sorted(coats)
+    assert set(coats) == {1, 2}
+    last = coats.index(2)
+    closes, opens = dut.motion.spray_on[last - 1, 1], dut.motion.spray_on[last, 0]
+    assert opens - closes >= raster.flash_off
+    still = np.abs(dut.motion.q - HOME).max(axis=1) < 1e-9
+    between = still & (dut.motion.time > closes) & (dut.motion.time < opens)
+    assert np.ptp(dut.motion.time[between]) == pytest.approx(45.0, abs=0.05)
+    # What is left of it is in two coats, too.
+    number = last - 1.5  # The last stroke but two of the first coat, half done.
+    rest = planner.program(strokes_from(dut.strokes, number), wall, HOME)
+    assert {stroke.coat for stroke in rest.strokes} == {1, 2}
+    assert rest.motion.duration > raster.flash_off
 
 
 def test_a_program_keeps_the_speed_that_its_nozzle_may_have(robot, make_wall):

@@ -20,7 +20,10 @@ def program():
     time = np.linspace(0.0, 4.0, 9)
     q = np.outer(np.sin(time), np.ones(5))
     return PaintProgram(
-        strokes=(stroke(0.1, 0.0, 1.0), stroke(0.3, 1.0, 0.5)),
+        strokes=(
+            stroke(0.1, 0.0, 1.0),
+            stroke(0.3, 1.0, 0.5).replace(standoff=0.1, flow=0.25, coat=2),
+        ),
         motion=Motion(time, q, np.cos(q), np.array([[0.4, 1.6], [2.5, 3.5]])),
         X_WT=RigidTransform([1.0, 2.0, 3.0]),
         standoff=0.3,
@@ -36,6 +39,7 @@ def test_round_trip(program, tmp_path):
     for a, b in zip(program.strokes, back.strokes, strict=True):
         np.testing.assert_array_equal([a.start_T, a.end_T], [b.start_T, b.end_T])
         assert (a.speed, a.kind, a.column) == (b.speed, b.kind, b.column)
+        assert (a.standoff, a.flow, a.coat) == (b.standoff, b.flow, b.coat)
     for name in ("time", "q", "v", "spray_on"):
         np.testing.assert_array_equal(
             getattr(program.motion, name), getattr(back.motion, name)
