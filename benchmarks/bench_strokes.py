@@ -1,4 +1,4 @@
-"""Strokes side by side: a plain raster, lines placed for edges, and cut in and fitted.
+"""Strokes side by side: a plain raster, lines placed for edges, cut in, in two coats.
 
 Run `python benchmarks/bench_strokes.py [SCENE ...]`. The masks are exact and the gun is
 where it should be: what a simulated cycle gives is this less the errors of map, base
@@ -36,7 +36,8 @@ def main() -> None:
     ways: dict[str, Callable[[BoolArray, FloatArray], tuple[Stroke, ...]]] = {
         "plain": plain,
         "placed": lambda mask, height: planned(mask, height, cut_in=False),
-        "cut in": lambda mask, height: planned(mask, height, cut_in=True),
+        "cut in": lambda mask, height: planned(mask, height),
+        "2 coats": lambda mask, height: planned(mask, height, coats=2),
     }
     print("scene      way     strokes  time  >=80 %   over     CV  keep-out   plan")
     for scene in sys.argv[1:] or SCENES:
@@ -66,15 +67,18 @@ def plain(mask: BoolArray, height: FloatArray) -> tuple[Stroke, ...]:
                 raster.speed,
                 "body",
                 column,
+                raster.standoff,
             )
             for low, high in edges.reshape(-1, 2)
         ]
     return tuple(strokes)
 
 
-def planned(mask: BoolArray, height: FloatArray, *, cut_in: bool) -> tuple[Stroke, ...]:
+def planned(
+    mask: BoolArray, height: FloatArray, *, cut_in: bool = True, coats: int = 1
+) -> tuple[Stroke, ...]:
     """Returns our strokes."""
-    raster = RasterConfig(cut_in=cut_in)
+    raster = RasterConfig(cut_in=cut_in, coats=coats)
     return plan_strokes(mask, CELL, tip=TIP, raster=raster, height=height)
 
 
@@ -86,9 +90,11 @@ def row(mask: BoolArray, height: FloatArray, strokes: tuple[Stroke, ...]) -> str
     model = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal)
     film = model.film(strokes)
     on, off = film[site.wanted], film[site.clean]
-    ordered = order_strokes(strokes, HOME_T, HOME_T)
-    spraying = sum(stroke.length / stroke.speed for stroke in ordered)
-    seconds = spraying + link_time(ordered, HOME_T, HOME_T)
+    seconds = sum(stroke.length / stroke.speed for stroke in strokes)
+    for coat in {stroke.coat for stroke in strokes}:
+        of_coat = [stroke for stroke in strokes if stroke.coat == coat]
+        ordered = order_strokes(of_coat, HOME_T, HOME_T)
+        seconds += link_time(ordered, HOME_T, HOME_T)
     soiled = f"{100 * np.mean(off >= 0.1):7.1f} %" if off.size else "        -"
     return (
         f"{len(strokes):7d} {seconds:5.0f} s {100 * np.mean(on >= 0.8):5.1f} % "
