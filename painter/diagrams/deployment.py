@@ -1,5 +1,6 @@
 """Runs one paint cycle on the robot at its bus's pace, and keeps what it leaves."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +31,8 @@ WATCH_PERIOD = 0.02
 BEHIND = 0.02
 # How long a stop may take until the cycle is given up, s.
 STOP_TIME = 3.0
+# Farther from where it is commanded to be, the gun paints what nobody planned, m.
+OFF_COURSE = 0.005
 _STILL = 1e-6
 
 
@@ -132,11 +135,11 @@ def DeployCycle(
     # What was commanded is carried out a little later.
     bus.wait_until(clock.execution(context.get_time()) + 2.0 * body.cycle)
     recorder.take()
-    status = _Corrected(body, recorder, strokes, status, context.get_time())
-    return _MakeLog(
+    log = _MakeLog(
         scenario, cycle, context, status, look_image,
         samples=recorder.samples(), clock=clock, desired=commands.FindLog(context),
     )  # fmt: skip
+    return dataclasses.replace(log, status=_Corrected(body, recorder, strokes, log))
 
 
 def _Stands(cycle: PaintCycleDiagram, context: Context) -> bool:
@@ -150,14 +153,14 @@ def _Corrected(
     body: Body,
     recorder: Recorder,
     strokes: list[tuple[float, float]],
-    status: CycleStatus,
-    time: float,
+    log: CycleLog,
 ) -> CycleStatus:
     """Returns the status with the stroke that the arm, not the diagram, came to.
 
-    Commands wait on the bus; those after a stop are never carried out.
+    Commands wait on the bus; those after a stop are never carried out, and those before
+    it in vain once the gun was off its course.
     """
-    stopped_at = recorder.last
+    status, stopped_at = log.status, recorder.last
     try:
         report = body.bus.report()
         feedback: Feedback | None = None if report is None else report.feedback
@@ -167,7 +170,8 @@ def _Corrected(
         if feedback.phase == Phase.ENABLED:
             return status
         stopped_at = feedback.stopped_at
-    done = body.clock.diagram_time(stopped_at) - body.clock.ahead
+    stop = body.clock.diagram_time(stopped_at)
+    done = on_course_until(log, stop) - body.clock.ahead
     times, numbers = np.array(strokes).T
     number = float(np.interp(done, times, numbers))
     if status.next_stroke == 0.0 or number == status.next_stroke:
@@ -175,8 +179,23 @@ def _Corrected(
     data = {"cause": status.cause, "next_stroke": max(number, 1.0)}
     return status.replace(
         next_stroke=data["next_stroke"],
-        events=(*status.events, (time, "stopped", data)),
+        events=(*status.events, (log.end_time, "stopped", data)),
     )
+
+
+def on_course_until(log: CycleLog, stop: float) -> float:
+    """Returns until when the gun was where it was commanded to be, s.
+
+    Args:
+        log: Of a cycle that was stopped.
+        stop: When the stop was known, s; that time if the gun was on its course then.
+    """
+    error = (log.X_WG - log.X_WG_desired)[log.time <= stop, :3, 3]
+    astray = np.linalg.norm(error, axis=1) > OFF_COURSE
+    if not astray.size or not astray[-1]:
+        return stop
+    before = np.flatnonzero(~astray)
+    return float(log.time[before[-1]]) if before.size else float(log.time[0])
 
 
 def _MakeLog(
