@@ -150,7 +150,8 @@ class Linker(FrozenValue):
             for a, b in itertools.pairwise([q0, *via, q1]):
                 # Routes share legs, and to check one for clearance takes time.
                 key = (id(a), id(b))
-                known.setdefault(key, rest_to_rest(a, b, self.limits))
+                if key not in known:
+                    known[key] = rest_to_rest(a, b, self.limits)
                 legs.append(known[key])
             plans.append(legs)
         if not self.clear(plans[0][0]):

@@ -131,7 +131,8 @@ def _in_picture(p_TCs: FloatArray, p_TQs: FloatArray) -> np.ndarray:
 
 def _in_order(q0: FloatArray, poses: FloatArray, linker: Linker) -> list[FloatArray]:
     """Returns the poses in the order that takes least time straight from `q0`."""
-    limits = linker.limits.replace(torques=None)  # To compare, rates will do.
+    # To compare, rates will do.
+    limits = linker.limits.replace(torques=None, nozzle=None)
     stops = [q0, *poses]
     times = [[rest_to_rest(a, b, limits).duration for b in stops] for a in stops]
 

@@ -85,7 +85,8 @@ def look_segments(
         look_poses(np.array([x * tile.width, y * tile.height]), scan, linker)
         for x, y in ((0.75, 0.25), (0.25, 0.75))
     )
-    limits = linker.limits.replace(torques=None)  # To compare, rates will do.
+    # To compare, rates will do.
+    limits = linker.limits.replace(torques=None, nozzle=None)
 
     def times(starts: FloatArray, ends: FloatArray) -> FloatArray:
         return np.array(
