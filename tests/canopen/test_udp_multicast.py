@@ -35,8 +35,8 @@ _PROGRAM = textwrap.dedent("""
     if __name__ == "__main__":
         way = ["--interface", "udp_multicast", "--channel", "239.74.163.2"]
         code = "from painter.cli.main import main; main()"
-        drives = subprocess.Popen([sys.executable, "-c", code, "drives", *way, "--json"],
-                                  stderr=subprocess.PIPE, text=True)
+        command = [sys.executable, "-c", code, "drives", *way, "--json"]
+        drives = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         assert "drives are on udp_multicast" in drives.stderr.readline()
         bus = load_bus(models_path("bus", "painter.bus.yaml"))
         bus = dataclasses.replace(bus, interface=way[1], channel=way[3], cycle=0.02)
