@@ -239,34 +239,41 @@ class FilmModel:
         edges = edges + cell * np.arange(2 * reach + 2)
         # The steepest ray that has landed by each column's far edge, on either side of
         # the axis; a column higher than the nozzle stops them all.
-        right = self._landed(edges[:, reach + 1 :], drop[:, reach:], standoff / a)
-        left = self._landed(-edges[:, reach::-1], drop[:, reach::-1], standoff / a)
-        share = np.zeros_like(drop)
-        share[:, reach:] += right
-        share[:, reach::-1] += left
+        outwards = np.stack([edges[:, reach + 1 :], -edges[:, reach::-1]])
+        drops = np.stack([drop[:, reach:], drop[:, reach::-1]])
+        right, left = self._landed(outwards, drops, standoff / a)
+        share = np.empty_like(drop)
+        share[:, reach:] = right
+        share[:, reach - 1 :: -1] = left[:, 1:]
+        share[:, reach] += left[:, 0]
         # Leaning, a metre of the stroke is less than a metre up.
-        share *= np.hypot(1.0, lean) * self._dose / cell
+        share *= math.hypot(1.0, lean) * self._dose / cell
 
-        first = min(max(int(middle.min()) - reach, 0), count - 1)
-        end = min(max(int(middle.max()) + reach, first) + 1, count)
+        ends = int(middle[0, 0]), int(middle[-1, 0])
+        first = min(max(min(ends) - reach, 0), count - 1)
+        end = min(max(max(ends) + reach, first) + 1, count)
         landed = np.zeros((rows.size, end - first))
         inside = (columns >= first) & (columns < end)
         row, _ = np.nonzero(inside)
         landed[row, columns[inside] - first] = share[inside]
-        offset = (site.x[first:end] - axis) / a
+        # Upright the axis is the same on all rows.
+        offset = (site.x[first:end] - (axis if lean else axis[:1])) / a
         thin = b * np.sqrt(np.maximum(1.0 - offset**2, 1e-4))
         film, thickness = np.zeros((ny, end - first)), np.full((ny, end - first), b)
-        film[low:high], thickness[low:high] = landed[back], thin[back]
+        film[low:high], thickness[low:high] = landed[back], thin
         return Line((first, end), film, thickness)
 
     def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:
         """Returns the flow's share on each column outwards from the spray axis.
 
         Args:
-            far: (k, n) m, far edges of the columns.
-            drop: (k, n) m, nozzle over each column.
+            far: (..., n) m, far edges of the columns.
+            drop: (..., n) m, nozzle over each column.
             scale: From a ray's slope to the fan's coordinate u.
         """
-        steepest = np.maximum.accumulate(far / drop, axis=1) * scale
+        steepest = np.maximum.accumulate(far / drop, axis=-1) * scale
         flow = np.interp(np.maximum(steepest, 0.0), _TABLE, self._cdf)
-        return np.diff(flow, axis=1, prepend=0.5)
+        share = np.empty_like(flow)
+        share[..., 0] = flow[..., 0] - 0.5
+        share[..., 1:] = flow[..., 1:] - flow[..., :-1]
+        return share
