@@ -1,6 +1,6 @@
 """A paint cycle over the bus beside the same one in the simulated station.
 
-`python benchmarks/bench_hil.py --out runs/hil` starts `painter drives --scenario` and
+`python benchmarks/bench_hil.py` starts `painter drives --scenario` and
 `painter deploy` as processes of their own, lets them paint, and compares the figures
 with those of `painter simulate`. Exit status 1 if one differs by more than 10 %. Four
 processes at once: on two cores take `--rate 0.5`, which gives all of them twice the
@@ -28,7 +28,9 @@ END_TIME = 300.0
 def main() -> int:
     """Runs both and prints the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True, help="folder of both runs")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/hil"), help="folder of both runs"
+    )
     parser.add_argument("--scenario", default="cubes", help="named scenario or file")
     parser.add_argument("--set", nargs="*", default=[], help="KEY=VALUE over it")
     parser.add_argument(

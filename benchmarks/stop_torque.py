@@ -1,6 +1,6 @@
 """Torques of a controlled stop at every instant of a run, beside the drives' limits.
 
-`python benchmarks/bench_stop.py RUN`, with a folder of `painter simulate` or `painter
+`python -m benchmarks.stop_torque RUN`, with a folder of `painter simulate` or `painter
 deploy`. At each instant the bus's stop ramp is begun from the measured joint speeds;
 what it takes is worked out with the arm's model and divided by the effort limits.
 """
