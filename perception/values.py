@@ -47,6 +47,8 @@ class SurfaceMap(FrozenValue):
         variances: (N,) float32, m², of the depth along the map's z axis.
         frames: Depth images fused so far.
         p_WCs: (3, frames) float64, m, in W: where they were taken; empty = unknown.
+        mount_tilt: Angle by which the pictures show the camera's mount to be tilted
+            against its model, rad; the points are where they are all the same.
     """
 
     p_WQs: FloatArray
@@ -55,6 +57,7 @@ class SurfaceMap(FrozenValue):
     variances: npt.NDArray[np.float32]
     frames: int
     p_WCs: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((3, 0)))
+    mount_tilt: float = 0.0
 
     @classmethod
     def empty(cls) -> Self:

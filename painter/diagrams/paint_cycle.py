@@ -189,7 +189,11 @@ def _AddPerception(
     }
     finder = builder.AddNamedSystem(
         "wall_finder",
-        WallFinder(X_WT_expected=nominal_tile_pose(scenario.tile), **settings),
+        WallFinder(
+            X_WT_expected=nominal_tile_pose(scenario.tile),
+            mount_limit_deg=scenario.pose_graph.mount_limit_deg,
+            **settings,
+        ),
     )
     segmenter = builder.AddNamedSystem("wall_segmenter", WallSegmenter(**settings))
     map_port = accumulator.GetOutputPort("surface_map")

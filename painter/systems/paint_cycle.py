@@ -362,6 +362,8 @@ class PaintCycle(LeafSystem):
             goal=now.request.goal,
             compute_s=result.compute_time,
         )
+        if result.warning is not None:
+            now = now.logged(time, "warning", stage=stage, warning=result.warning)
         if step.action == Action.MOVE and result.value is not None:
             return self._Moving(now, result, time, spray=False)
         return self._Entered(now, now.step + 1, time)

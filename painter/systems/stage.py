@@ -53,6 +53,10 @@ class Stage(LeafSystem):
         """Does the work; returns a frozen value, raises an error of Painter's own."""
         raise NotImplementedError
 
+    def _Warning(self, context: Context) -> str | None:
+        """Returns what somebody should look at although the work is done, if any."""
+        return None
+
     def _UpdateResult(self, context: Context, state: State) -> EventStatus:
         request = EvalAs(self._request_port, context, StageRequest)
         index = int(self._result_index)
@@ -60,15 +64,17 @@ class Stage(LeafSystem):
         if request.stage != self._stage or request.number == last.number:
             return EventStatus.DidNothing()
         start = time.perf_counter()
-        value, error = None, None
+        value, error, warning = None, None, None
         try:
             value = self._Work(context, request.goal)
+            warning = self._Warning(context)
         except (PainterError, PerceptionError) as failure:
             error = f"{type(failure).__name__}: {failure}"
         result = StageResult(
             number=request.number,
             value=value,
             error=error,
+            warning=warning,
             compute_time=time.perf_counter() - start,
         )
         state.get_mutable_abstract_state(index).set_value(result)

@@ -111,12 +111,14 @@ class StageResult(FrozenValue):
         number: Of the request; 0 = nothing done yet.
         value: The result, or None where it failed.
         error: One line saying why it failed, or None.
+        warning: One line saying what somebody should look at, or None.
         compute_time: Wall-clock time of the work, s; a log entry, never a decision.
     """
 
     number: int = 0
     value: Any = None
     error: str | None = None
+    warning: str | None = None
     compute_time: float = 0.0
 
 

@@ -43,6 +43,8 @@ class PoseGraphConfig:
             deviation to this share of the arm's.
         optimize_every: Keyframes between optimisations while frames come in.
         max_range: Farthest depth used, m.
+        mount_limit_deg: A camera whose mount is found to be tilted by more is to be
+            calibrated anew; the map is right all the same.
         refuse_distance: A map that is corrected while the arm scans is fused again if
             the correction moves the surface farther than this, m, root mean square.
     """
@@ -69,6 +71,7 @@ class PoseGraphConfig:
     observed_ratio: float = 0.1
     optimize_every: int = 5
     max_range: float = 3.0
+    mount_limit_deg: float = 0.1
     refuse_distance: float = 0.001
 
     def validate(self) -> None:

@@ -147,7 +147,11 @@ class LiveMap(FrozenValue):
     @functools.cached_property
     def surface_map(self) -> SurfaceMap:
         """The surface, in W."""
-        return (self._fused_again() if self.is_moved else self.voxels).surface_map
+        if not self.pictures:
+            return self.voxels.surface_map
+        surface = (self._fused_again() if self.is_moved else self.voxels).surface_map
+        tilt = np.linalg.norm(self.solution.estimate.mount[:3])
+        return surface.replace(mount_tilt=float(tilt))
 
     def _X_WCf(self, k: int) -> RigidTransform:
         """Returns where keyframe k was fused."""

@@ -79,6 +79,7 @@ def test_a_mounts_tilt_is_found_and_undone(tilted):
     assert by_arm[2] > 3e-4
     assert spread < 0.6 * by_arm[2]
     assert np.abs(tilt).max() < 0.02
+    assert np.degrees(tilted.surface_map.mount_tilt) == pytest.approx(0.283, abs=0.03)
     found = RollPitchYaw(tilted.solution.mount.rotation()).vector()
     np.testing.assert_allclose(np.degrees(found), [0.2, -0.2, 0.0], atol=0.03)
 
