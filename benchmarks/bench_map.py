@@ -1,7 +1,8 @@
 """The map accumulator on rendered walls and recordings, row by row of issue 6.
 
-`python benchmarks/bench_map.py [ROW ...] [--rate HZ]`; rows: textured, textured-no-arm,
-painted, window, blank, blank-no-arm, wrong-links, memory; without names all but memory.
+`python benchmarks/bench_map.py [ROW ...] [--rate HZ] [--scans N]`; rows: textured,
+textured-no-arm, painted, window, blank, blank-no-arm, wrong-links, memory; without
+names all but memory.
 Sequences: 848 x 480 through the D435 model, 0.7 m from the wall, zig-zag of five rows
 over 2 x 2 m, seed 7. CPU is of the whole process, also what runs on a second core.
 """
@@ -9,12 +10,14 @@ over 2 x 2 m, seed 7. CPU is of the whole process, also what runs on a second co
 import argparse
 import resource
 import time
+from collections.abc import Iterator
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.depth import CameraIntrinsics
 from perception.mapping.config import MapperConfig
+from perception.mapping.frames import Frame
 from perception.mapping.mapper import Mapper, MappingResult, NoMapError
 from perception.mapping.report import session_report
 from perception.mapping.sequences import (
@@ -54,20 +57,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("rows", nargs="*", default=list(ROWS)[:-1], choices=list(ROWS))
     parser.add_argument("--rate", type=float, default=5.0, help="frames a second, Hz")
+    parser.add_argument("--scans", type=int, default=1, help="times over the wall")
     words = parser.parse_args()
     for row in words.rows:
-        run_row(row, words.rate)
+        run_row(row, words.rate, words.scans)
 
 
-def run_row(row: str, rate: float) -> None:
+def run_row(row: str, rate: float, scans: int = 1) -> None:
     wall, errors, with_arm = ROWS[row]
     config = SequenceConfig(wall=wall, rate=rate, **errors)
     mapper = Mapper(CameraIntrinsics.from_stereo(config.stereo), MapperConfig())
     truth, arm = {}, {}
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    before = peak_memory()
     cpu = 0.0
     try:
-        for frame, X_WC in render_sequence(config, SEED):
+        for frame, X_WC in scanned(config, scans):
             truth[frame.time], arm[frame.time] = X_WC, frame.X_WC
             start = time.process_time()
             mapper.add(frame if with_arm else frame.replace(X_WC=None))
@@ -79,7 +83,7 @@ def run_row(row: str, rate: float) -> None:
     except NoMapError as error:
         print(f"{row}: refused: {error}")
         return
-    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    after = peak_memory()
     report = session_report(mapper, result)
     placed, total = len(result.poses), len(truth)
     print(f"{row}: {placed} of {total} frames, {len(mapper.graph.keyframes)} keyframes")
@@ -102,6 +106,25 @@ def run_row(row: str, rate: float) -> None:
         f"fusion; all frames {1e3 * cpu / total:.0f} ms a frame; peak memory "
         f"+{after - before:.0f} MB (renderer's included)"
     )
+
+
+def scanned(
+    config: SequenceConfig, scans: int
+) -> Iterator[tuple[Frame, RigidTransform]]:
+    """Yields the frames of several scans, one after the other."""
+    begun, last = 0.0, 0.0
+    for scan in range(scans):
+        for frame, X_WC in render_sequence(config, SEED + scan):
+            last = begun + frame.time
+            yield frame.replace(time=last), X_WC
+        begun = last + 1.0
+        if scans > 1:
+            print(f"  after scan {scan + 1}: peak {peak_memory():.0f} MB", flush=True)
+
+
+def peak_memory() -> float:
+    """Returns the process's peak so far, MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
 def spoil_links(mapper: Mapper) -> None:
