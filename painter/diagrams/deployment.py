@@ -110,13 +110,13 @@ def DeployCycle(
     simulator.Initialize()
     strokes: list[tuple[float, float]] = []
     look_image, stop_by = None, np.inf
+    steps, time = 0, 0.0
     while True:
-        time = context.get_time() + WATCH_PERIOD
-        bus.wait_until(clock.due(time))
-        simulator.AdvanceTo(time)
+        for _ in range(max(1, round(WATCH_PERIOD / body.cycle))):
+            steps += 1
+            time = steps * body.cycle
+            _Advance(simulator, cycle, body, time)
         recorder.take()
-        if _Stands(cycle, context) and bus.now() - clock.due(time) > BEHIND:
-            clock.hold(time, bus.now())
         status: CycleStatus = Evaluate(cycle, context, "cycle_status")
         strokes.append((time, status.next_stroke))
         if watch is not None:
@@ -140,6 +140,22 @@ def DeployCycle(
         samples=recorder.samples(), clock=clock, desired=commands.FindLog(context),
     )  # fmt: skip
     return dataclasses.replace(log, status=_Corrected(body, recorder, strokes, log))
+
+
+def _Advance(
+    simulator: Simulator, cycle: PaintCycleDiagram, body: Body, time: float
+) -> None:
+    """Goes on to a time, one bus cycle on, when the robot's clock comes to it.
+
+    Where the arm stood before, its clock stops for what took long: the first commands
+    of a motion that was planned meanwhile are still ahead of their time.
+    """
+    stood = _Stands(cycle, simulator.get_context())
+    body.bus.wait_until(body.clock.due(time))
+    simulator.AdvanceTo(time)
+    now = body.bus.now()
+    if stood and now - body.clock.due(time) > BEHIND:
+        body.clock.hold(time, now)
 
 
 def _Stands(cycle: PaintCycleDiagram, context: Context) -> bool:
