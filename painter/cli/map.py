@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,10 +24,10 @@ from perception.depth import CameraIntrinsics
 from perception.mapping.bag import unpack_bag
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import Frame, open_recording, write_poses
-from perception.mapping.fusion import write_map, write_mesh
+from perception.mapping.fusion import write_map, write_mesh, write_voxels
 from perception.mapping.mapper import Mapper
 from perception.mapping.report import session_report
-from perception.mapping.session import run_session
+from perception.mapping.session import join_map, run_session
 from perception.mapping.store import MapStore
 
 MAP_SUFFIX = ".db"
@@ -60,7 +61,21 @@ def map(
             help="Keep the session in this file; one that was broken off goes on.",
         ),
     ] = None,
+    onto: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.db",
+            help="Find by their looks where the frames lie in this map, after the base "
+            "was moved, and map both as one. The file stays as it is.",
+        ),
+    ] = None,
     mesh: Annotated[bool, typer.Option(help="Write mesh.ply as well.")] = False,
+    voxels: Annotated[
+        float | None,
+        typer.Option(
+            metavar="EDGE", help="Write voxels.npz as well: cubes of this edge, m."
+        ),
+    ] = None,
     overrides: Annotated[
         list[str] | None,
         typer.Option(
@@ -74,9 +89,11 @@ def map(
     """Map a recorded RGB-D sequence: correct its poses and fuse one surface.
 
     Writes poses.txt (TUM form), map.ply (normals, colours, counts, variances), map.json
-    (frames, links, corrections, observed directions, timings) and, if wanted, mesh.ply.
+    (frames, links, corrections, observed directions, timings), and what else is wanted.
     """
     config = mapper_config(overrides)
+    if voxels is not None and not 0.0 < voxels < math.inf:
+        raise InputError(f"--voxels must be > 0 m, got {voxels!r}.")
     with ExitStack() as stack:
         intrinsics, source, total = _source(stack, frames, poses, use_poses)
         session = None
@@ -93,12 +110,25 @@ def map(
             session,
             lambda number: show(number / total, f"frame {number + 1} of {total}"),
         )
+        if onto is not None:
+            known = stack.enter_context(open_map(onto))
+            if known.intrinsics != intrinsics:
+                raise InputError(f"{onto}: was made with another camera.")
+            result, found = join_map(mapper, known)
         report = session_report(mapper, result)
+        if onto is not None:
+            report["joined"] = {
+                "X_MN": found.X_MN.GetAsMatrix4().round(6).tolist(),
+                "keyframes_agreeing": found.agreeing,
+                "keyframes_recognised": found.found,
+            }
         folder = stack.enter_context(output_folder(out))
         write_poses(folder / "poses.txt", result.poses)
         write_map(folder / "map.ply", result.fused)
         if mesh:
             report["triangles"] = write_mesh(folder / "mesh.ply", result.fused)
+        if voxels is not None:
+            report["voxels"] = write_voxels(folder / "voxels.npz", result.fused, voxels)
         text = json.dumps(report, indent=2, allow_nan=False)
         (folder / "map.json").write_text(text + "\n")
     print_result(report, as_json=as_json)
@@ -138,6 +168,21 @@ def mapper_config(overrides: list[str] | None) -> MapperConfig:
     return config
 
 
+def open_map(path: Path) -> MapStore:
+    """Opens a map file that is there.
+
+    Raises:
+        InputError: There is none, or it holds no keyframes.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file.")
+    store = MapStore(path)
+    if store.intrinsics is None or not len(store):
+        store.close()
+        raise InputError(f"{path}: holds no keyframes.")
+    return store
+
+
 def _source(
     stack: ExitStack, path: Path, poses: Path | None, use_poses: bool
 ) -> tuple[CameraIntrinsics, Iterable[Frame], int]:
@@ -149,11 +194,8 @@ def _source(
     if path.suffix != MAP_SUFFIX:
         recording = open_recording(path, poses=poses, use_poses=use_poses)
         return recording.intrinsics, recording.frames(), len(recording.entries)
-    if not path.is_file():
-        raise InputError(f"{path}: no such file.")
-    old = stack.enter_context(MapStore(path))
-    if old.intrinsics is None or not len(old):
-        raise InputError(f"{path}: holds no keyframes.")
+    old = stack.enter_context(open_map(path))
+    assert old.intrinsics is not None  # A map that is opened has a camera.
     frames = (frame for _, frame, _, _ in old.keyframes())
     if not use_poses:
         frames = (frame.replace(X_WC=None) for frame in frames)

@@ -114,6 +114,29 @@ def write_map(path: Path, fused: FusedMap) -> None:
     o3d.t.io.write_point_cloud(path, cloud)
 
 
+def write_voxels(path: Path, fused: FusedMap, edge: float) -> int:
+    """Writes the cubes that hold points: NPZ with `index`, `count`, `edge` and `X_WV`.
+
+    Cube (i, j, k) of `index` (n, 3) int32 reaches from `edge` (i, j, k) in V on; its
+    `count` (n,) is of pixels. V is the map's own frame, z out of the main surface.
+
+    Args:
+        path: The file.
+        fused: The map.
+        edge: Of a cube, m.
+
+    Returns:
+        How many there are.
+    """
+    p_VQs = fused.X_WV.inverse() @ fused.p_WQs if fused.p_WQs.size else fused.p_WQs
+    cells = np.floor(p_VQs / edge).astype(np.int32)
+    index, owner = np.unique(cells, axis=1, return_inverse=True)
+    count = np.bincount(owner.ravel(), fused.counts, index.shape[1]).astype(np.int64)
+    X_WV = fused.X_WV.GetAsMatrix4()
+    np.savez_compressed(path, index=index.T, count=count, edge=edge, X_WV=X_WV)
+    return int(index.shape[1])
+
+
 def write_mesh(path: Path, fused: FusedMap, depth: int = 9) -> int:
     """Writes a Poisson mesh of the points, cut where there are none.
 

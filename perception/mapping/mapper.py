@@ -66,6 +66,7 @@ class Mapper:
     """Maps a sequence; `add` the frames, then `finish`.
 
     Attributes:
+        config: Settings; not to be changed.
         graph: Keyframes so far, with links and planes.
         outcomes: How many frames came to what.
         seconds: CPU time of every keyframe, s.
@@ -83,12 +84,13 @@ class Mapper:
         Raises:
             ValueError: A setting is out of bounds.
         """
+        self.config = config
         self.graph = KeyframeGraph.empty(intrinsics, config)
         self.outcomes: Counter[Outcome] = Counter()
         self.seconds: list[float] = []
         self.placed: list[tuple[float, int, RigidTransform]] = []
         self.fuse_seconds = 0.0
-        self._intrinsics, self._config = intrinsics, config
+        self._intrinsics = intrinsics
         self._last_time = -np.inf
         self._best_inliers = 0
 
@@ -125,7 +127,7 @@ class Mapper:
             graph.poses,
             graph.main_frame(),
             self._intrinsics,
-            self._config,
+            self.config,
         )
         self.fuse_seconds = time.process_time() - start
         poses = [(t, graph.poses[k] @ X_KC) for t, k, X_KC in self.placed]
@@ -143,7 +145,7 @@ class Mapper:
         features = None
         tracked = None
         if frame.X_WC is None:
-            features = find_features(frame, self._intrinsics, self._config)
+            features = find_features(frame, self._intrinsics, self.config)
             tracked = self._track(features)
         X_WC = self._predict(frame, tracked)
         if X_WC is None:
@@ -154,10 +156,10 @@ class Mapper:
                 self.placed.append((frame.time, len(poses) - 1, X_KC))
                 return Outcome.TRACKED
         if features is None:
-            features = find_features(frame, self._intrinsics, self._config)
+            features = find_features(frame, self._intrinsics, self.config)
         number = sum(self.outcomes.values())
         self.add_keyframe(
-            make_keyframe(frame, number, features, self._intrinsics, self._config),
+            make_keyframe(frame, number, features, self._intrinsics, self.config),
             X_WC,
         )
         return Outcome.KEYFRAME
@@ -166,10 +168,8 @@ class Mapper:
         self, frame: Frame, number: int, X_WC: RigidTransform, links: list[Link]
     ) -> None:
         """Takes a keyframe back from a store, with the links that were found then."""
-        features = find_features(frame, self._intrinsics, self._config)
-        keyframe = make_keyframe(
-            frame, number, features, self._intrinsics, self._config
-        )
+        features = find_features(frame, self._intrinsics, self.config)
+        keyframe = make_keyframe(frame, number, features, self._intrinsics, self.config)
         self.add_keyframe(keyframe, X_WC, links)
 
     def add_keyframe(
@@ -186,7 +186,7 @@ class Mapper:
         self.placed.append((keyframe.time, index, RigidTransform()))
         self._last_time = max(self._last_time, keyframe.time)
         self.graph = self.graph.extended(keyframe, X_WC, links)
-        if index and index % self._config.optimize_every == 0:
+        if index and index % self.config.optimize_every == 0:
             self.graph, _ = self.graph.optimized(quick=True)
 
     def _track(self, features: Features) -> Link | None:
@@ -198,7 +198,7 @@ class Mapper:
                 keyframes[index].features,
                 features,
                 self._intrinsics,
-                self._config,
+                self.config,
                 (index, len(keyframes)),
             )
             self._best_inliers = max(self._best_inliers, inliers)
@@ -238,7 +238,7 @@ class Mapper:
         if lost:
             return NoMapError(
                 f"{lost} of {total} frames have no pose and could not be followed: "
-                f"{self._best_inliers} corners agree, {self._config.min_inliers} are "
+                f"{self._best_inliers} corners agree, {self.config.min_inliers} are "
                 "needed. The wall shows too little texture; give the arm's poses."
             )
         counts = ", ".join(f"{name}: {n}" for name, n in self.outcomes.items())

@@ -6,6 +6,7 @@ from pydrake.math import RigidTransform
 
 from perception.mapping.frames import Frame
 from perception.mapping.mapper import Mapper, MappingResult, Outcome
+from perception.mapping.places import Localisation, joined, localise
 from perception.mapping.store import MapStore
 
 
@@ -40,6 +41,30 @@ def run_session(
     if store is not None:
         store.save_answer(result.solution.graph.poses, mapper.seconds)
     return result
+
+
+def join_map(mapper: Mapper, store: MapStore) -> tuple[MappingResult, Localisation]:
+    """Finds where a session lies in a stored map and maps both as one.
+
+    Args:
+        mapper: After `finish`; becomes the one of both sessions.
+        store: The map, with keyframes; it stays as it is.
+
+    Returns:
+        The map of both in the stored one's world, with the poses of the mapper's own
+        frames, and where that session's world lies in it.
+
+    Raises:
+        NotLocalisedError: The map does not show where the session was taken.
+    """
+    older = Mapper(mapper.graph.intrinsics, mapper.config)
+    _restore(older, store)
+    known = older.graph.solved().graph
+    found = localise(known, mapper.graph)
+    mapper.graph = joined(known, mapper.graph, found.X_MN)
+    count = len(known.keyframes)
+    mapper.placed = [(time, count + k, X_KC) for time, k, X_KC in mapper.placed]
+    return mapper.finish(), found
 
 
 def _save(

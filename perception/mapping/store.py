@@ -60,6 +60,10 @@ class MapStore:
         return self
 
     def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file."""
         self._db.close()
 
     def start(self, intrinsics: CameraIntrinsics, config: MapperConfig) -> None:

@@ -12,6 +12,7 @@ import time
 import numpy as np
 import open3d as o3d
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
 
 from painter.cli.main import run
 from perception.config import StereoConfig
@@ -58,6 +59,33 @@ def test_a_blank_wall_without_poses_leaves_nothing(recording, tmp_path, capsys):
     assert not out.exists()
 
 
+def test_a_session_is_joined_onto_a_map(tmp_path, capsys):
+    config = SequenceConfig(wall=WallKind.TEXTURED, rate=2.5, stereo=STEREO)
+    frames = list(itertools.islice(render_sequence(config, 7), 14))
+    X_MN = RigidTransform(RollPitchYaw(0.0, 0.0, 0.4), [0.5, -0.2, 0.1])
+    parts = {"first": frames[:9], "second": frames[6:]}
+    parts["second"] = [
+        (frame.replace(X_WC=X_MN.inverse() @ frame.X_WC), X_WC)
+        for frame, X_WC in parts["second"]
+    ]
+    for name, part in parts.items():
+        (tmp_path / name).mkdir()
+        write_recording(tmp_path / name, CameraIntrinsics.from_stereo(STEREO), part)
+    words = ["map", str(tmp_path / "first"), "--out", str(tmp_path / "one")]
+    assert run([*words, "--store", str(tmp_path / "map.db")]) == 0
+    capsys.readouterr()
+    words = ["map", str(tmp_path / "second"), "--out", str(tmp_path / "both"), "--json"]
+    assert run([*words, "--onto", str(tmp_path / "map.db")]) == 0
+    report = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(report["joined"]["X_MN"], X_MN.GetAsMatrix4(), atol=0.02)
+    # The second session's poses are in the first one's world now.
+    for (_, X_WC), (frame, _) in zip(
+        read_poses(tmp_path / "both" / "poses.txt"), parts["second"], strict=True
+    ):
+        off = X_WC.translation() - (X_MN @ frame.X_WC).translation()
+        assert np.linalg.norm(off) < 0.01
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -65,6 +93,8 @@ def test_a_blank_wall_without_poses_leaves_nothing(recording, tmp_path, capsys):
         (["--set", "mapping.cell=wide"], "'wide' is no number"),
         (["--set", "mapping.cell=-1"], "mapping.cell must be > 0"),
         (["--poses", "no_such_file.txt"], "no such file"),
+        (["--voxels", "0"], "--voxels must be > 0 m, got 0.0"),
+        (["--onto", "no_such_map.db"], "no_such_map.db: no such file"),
     ],
 )
 def test_wrong_words_are_one_line(recording, tmp_path, capsys, words, message):

@@ -5,7 +5,7 @@ from pydrake.math import RigidTransform
 
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import Frame
-from perception.mapping.fusion import fuse, write_map, write_mesh
+from perception.mapping.fusion import fuse, write_map, write_mesh, write_voxels
 from perception.mapping.keyframe import Features, make_keyframe
 
 # Nine pixels a voxel at 0.7 m: the test's camera has a pixel every 3.1 mm.
@@ -60,6 +60,19 @@ def test_a_step_stays_two_surfaces(intrinsics):
     step[:, 212:] = 670
     fused = fused_of(intrinsics, [step] * 2)
     np.testing.assert_allclose(np.unique(fused.p_WQs[2].round(3)), [0.67, 0.70])
+
+
+def test_voxels_are_the_cubes_that_hold_points(intrinsics, tmp_path):
+    fused = fused_of(intrinsics, [flat(intrinsics, 705)] * 2)
+    count = write_voxels(tmp_path / "voxels.npz", fused, 0.05)
+    with np.load(tmp_path / "voxels.npz") as file:
+        index, edge = file["index"], float(file["edge"])
+        assert file["count"].sum() == fused.counts.sum()
+    # V's z looks back at the camera: the wall is 0.705 m behind, in the 15th layer.
+    assert set(index[:, 2]) == {-15}
+    width = 0.705 * intrinsics.width / intrinsics.fx
+    height = 0.705 * intrinsics.height / intrinsics.fy
+    assert count == len(index) == pytest.approx(width * height / edge**2, rel=0.12)
 
 
 def test_files_hold_the_map(intrinsics, tmp_path):
