@@ -300,7 +300,7 @@ class FilmFit:
     def _film(self, span: Span, line: Line, window: _Window) -> FloatArray:
         """Returns a span's film on rows of its window."""
         first, stop = window.rows.start, window.rows.stop
-        film = np.asarray(span.flow * line.film[window.rows])
+        film = np.asarray(span.flow * line.film[line.own(window.rows)])
         begun = self._model.rows(span.low, span.low, span.standoff)
         ended = self._model.rows(span.high, span.high, span.standoff)
         if begun.stop > ended.start:

@@ -109,14 +109,19 @@ class Line(FrozenValue):
 
     Attributes:
         columns: First and end column of the window.
-        film: (ny, n) film of an endless stroke with full flow; on rows that were not
-            asked for it may lack.
-        thickness: (ny, n) m, half the fan's thickness as it passes over each cell.
+        first_row: Of the k rows of the site that it was made on.
+        film: (k, n) film of an endless stroke with full flow.
+        thickness: (k, n) m, half the fan's thickness as it passes over each cell.
     """
 
     columns: tuple[int, int]
+    first_row: int
     film: FloatArray
     thickness: FloatArray
+
+    def own(self, rows: slice) -> slice:
+        """Returns where rows of the site are among its own."""
+        return slice(rows.start - self.first_row, rows.stop - self.first_row)
 
 
 class FilmModel:
@@ -165,7 +170,7 @@ class FilmModel:
             x_line: Where it meets T y = 0, m in T.
             standoff: From which it is sprayed, m.
             lean: By how much it goes to the right in going up, m/m.
-            rows: Those of the site that are looked at; None = all.
+            rows: Those of the site that are wanted; None = all.
         """
         first, stop = 0, len(self.site.y)
         if rows is not None:
@@ -192,7 +197,7 @@ class FilmModel:
         """
         offset = self.site.y[rows, None] - end
         return np.asarray(
-            np.interp(offset / line.thickness[rows], _TABLE, self._across)
+            np.interp(offset / line.thickness[line.own(rows)], _TABLE, self._across)
         )
 
     def film(self, strokes: Sequence[Stroke]) -> FloatArray:
@@ -207,7 +212,9 @@ class FilmModel:
             line = self.line(x - lean * y, stroke.standoff, lean, rows)
             share = self.below(line, rows, low) - self.below(line, rows, high)
             scale = stroke.flow * self._speed / stroke.speed
-            film[rows, slice(*line.columns)] += scale * line.film[rows] * share
+            film[rows, slice(*line.columns)] += (
+                scale * line.film[line.own(rows)] * share
+            )
         return film
 
     def _make_line(
@@ -216,7 +223,7 @@ class FilmModel:
         """Makes a line on the rows from `low` up to `high`."""
         site, cell = self.site, self.site.cell
         a, b = half_axes(self._tip, standoff)
-        ny, count = site.wanted.shape
+        count = site.wanted.shape[1]
         # What lies back is reached by rays that went past the fan's width on the wall.
         reach = int(np.ceil((1.0 - site.deepest / standoff) * a / cell)) + 1
         # Rows that are as the one below them are looked at once.
@@ -259,9 +266,8 @@ class FilmModel:
         # Upright the axis is the same on all rows.
         offset = (site.x[first:end] - (axis if lean else axis[:1])) / a
         thin = b * np.sqrt(np.maximum(1.0 - offset**2, 1e-4))
-        film, thickness = np.zeros((ny, end - first)), np.full((ny, end - first), b)
-        film[low:high], thickness[low:high] = landed[back], thin
-        return Line((first, end), film, thickness)
+        film = landed[back]
+        return Line((first, end), low, film, np.broadcast_to(thin, film.shape))
 
     def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:
         """Returns the flow's share on each column outwards from the spray axis.
@@ -276,4 +282,4 @@ class FilmModel:
         share = np.empty_like(flow)
         share[..., 0] = flow[..., 0] - 0.5
         share[..., 1:] = flow[..., 1:] - flow[..., :-1]
-        return share
+        return np.asarray(share)

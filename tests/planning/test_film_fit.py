@@ -132,12 +132,12 @@ def test_a_line_is_the_same_on_some_rows_as_on_all():
         whole, some = dut.line(0.9, 0.2, lean), dut.line(0.9, 0.2, lean, rows)
         film = np.zeros(height.shape + 2 * np.array(dut.site.border))
         film[:, slice(*whole.columns)] = whole.film
-        film[rows, slice(*some.columns)] -= some.film[rows]
+        film[rows, slice(*some.columns)] -= some.film[some.own(rows)]
         assert np.abs(film[rows]).max() == 0.0
         # Half the fan's thickness is that of the same line, too.
         first = some.columns[0] - whole.columns[0]
         cut = whole.thickness[rows, first : first + some.film.shape[1]]
-        np.testing.assert_array_equal(some.thickness[rows], cut)
+        np.testing.assert_array_equal(some.thickness[some.own(rows)], cut)
 
 
 def test_a_leaning_stick_is_cut_in_along_its_sides():
