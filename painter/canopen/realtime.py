@@ -61,6 +61,18 @@ def use_fifo(priority: int = _PRIORITY) -> bool:
     return True
 
 
+def prefer(niceness: int) -> None:
+    """Puts this process, and those it starts, before others; where allowed.
+
+    Args:
+        niceness: -20 to -1.
+    """
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, niceness)
+    except OSError as error:
+        _LOGGER.info("no niceness of %d: %s", niceness, error)
+
+
 class Ticker:
     """Due times, one a period; late ones are counted and skipped, never caught up."""
 

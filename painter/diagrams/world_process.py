@@ -6,7 +6,6 @@ shared memory, and here camera, film and clearances follow as fast as they can.
 
 import contextlib
 import multiprocessing
-import os
 import signal
 import tempfile
 import time
@@ -16,6 +15,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from painter.camera.frame_link import FrameServer
+from painter.canopen.realtime import prefer
 from painter.canopen.sample_ring import SampleRing
 from painter.config import Scenario, dump_scenario, load_scenario
 from painter.diagrams.sim_world import SimWorld
@@ -170,8 +170,7 @@ def _read(text: str) -> Scenario:
 def _run(scenario: str, ring_name: str, camera: str, pipe: Connection) -> None:
     """The world's process: Ctrl-C is the parent's business."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with contextlib.suppress(OSError):  # A camera waits for no other program.
-        os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
+    prefer(_NICENESS)  # A camera waits for no other program.
     ring = SampleRing(name=ring_name)
     server = None
     try:

@@ -98,3 +98,15 @@ def test_without_the_right_to_fifo_there_is_a_warning(monkeypatch, caplog):
     with caplog.at_level(logging.WARNING):
         assert not realtime.use_fifo()
     assert "no SCHED_FIFO" in caplog.text
+
+
+def test_a_niceness_that_may_not_be_had_is_no_error(monkeypatch):
+    asked = []
+
+    def refuse(*args):
+        asked.append(args)
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "setpriority", refuse)
+    realtime.prefer(-18)
+    assert asked == [(os.PRIO_PROCESS, 0, -18)]
