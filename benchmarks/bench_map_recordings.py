@@ -19,8 +19,8 @@ from perception.mapping.mapper import Mapper
 from perception.mapping.session import run_session
 
 TABLES = ("table_0p50m", "table_0p80m_empty", "table_0p80m_cable")
-# The sequence reaches 4 m; its poses are a tracker's, good to some mm.
-SEQUENCE = MapperConfig(max_range=4.0, arm_sigma=0.005, arm_sigma_deg=0.3)
+# The sequence reaches 4 m; its poses are a tracker's, good to about a centimetre.
+SEQUENCE = MapperConfig(max_range=4.0, arm_sigma=0.010, arm_sigma_deg=0.5)
 # Every view is a keyframe; the arm's hand-eye error is a degree.
 TABLE = MapperConfig(
     arm_sigma=0.005, arm_sigma_deg=1.0, keyframe_distance=1e-4, keyframe_angle_deg=0.01

@@ -112,3 +112,21 @@ def test_few_pictures_become_keyframes(tilted):
 def test_a_picture_of_another_size_is_refused(tilted):
     with pytest.raises(ValueError, match="must be"):
         tilted.fused(0.0, np.full((10, 10), 700, np.uint16), X_WT)
+
+
+def test_pictures_without_depth_are_no_surface_and_no_error():
+    dut = LiveMap.empty(X_WT, SIZE, CONFIG, CAMERA, PoseGraphConfig())
+    nothing = np.zeros((CAMERA.height, CAMERA.width), np.uint16)
+    for time, X_arm in enumerate(places()[:3]):
+        dut = dut.fused(float(time), nothing, X_arm)
+    assert dut.surface_map.p_WQs.shape == (3, 0)
+    assert dut.surface_map.mount_tilt == 0.0
+    assert not dut.is_moved
+
+
+def test_one_view_tells_nothing_of_the_mount():
+    X_arm = places()[0]
+    dut = LiveMap.empty(X_WT, SIZE, CONFIG, CAMERA, PoseGraphConfig())
+    dut = dut.fused(0.0, depth_of_wall(X_arm @ MOUNT), X_arm)
+    assert not dut.is_moved
+    assert dut.surface_map.mount_tilt == pytest.approx(0.0, abs=1e-6)
