@@ -73,3 +73,25 @@ def test_collision_names_motion_time_and_bodies(robot):
     q = robot.linker().gun.solve(np.array([[1.0, 1.0, 0.6], [1.0, 1.0, 0.3]]))
     with pytest.raises(CollisionError, match=r"test: gun and surroundings.* 2\.50 s"):
         space.require(q, np.array([1.0, 2.5]), what="test")
+
+
+@pytest.mark.parametrize("where", [0, 7, 8, 17, 40])
+def test_one_blocked_place_among_many_is_found_wherever_it_is(robot, where):
+    """The gun passes a post before it at one of 41 places alone."""
+    y = np.linspace(0.6, 1.4, 41)
+    post = ObstacleBox(
+        "post",
+        np.array([0.99, y[where] - 0.005, 0.0]),
+        np.array([1.01, y[where] + 0.005, 0.27]),
+    )
+    linker = robot.linker(post)
+    heights = np.full(41, 0.5)
+    heights[where] = 0.3
+    q = linker.gun.solve(np.column_stack([np.ones(41), y, heights]))
+    time = np.linspace(0.0, 4.0, 41)
+    others = np.arange(41) != where
+    assert linker.space.all_free(q[others])
+    assert not linker.space.all_free(q)
+    linker.space.require(q[others], time[others], what="test")
+    with pytest.raises(CollisionError, match=f"at {time[where]:.2f} s"):
+        linker.space.require(q, time, what="test")
