@@ -92,8 +92,10 @@ def measure(*, busy: bool, log: Path) -> Report:
         bus = load_bus(models_path("bus", "painter.bus.yaml"))
         channel = str(Path(folder) / "can")
         bus = dataclasses.replace(bus, interface="local", channel=channel)
-        # Missing TPDOs are counted here: simulated drives share the cores, real do not.
-        bus.timeouts = dataclasses.replace(bus.timeouts, tpdo=1.0)
+        # What is late is counted here, and must not end the run: simulated drives share
+        # the cores, real ones do not.
+        bus.timeouts = dataclasses.replace(bus.timeouts, tpdo=1.0, rpdo_cycles=200)
+        bus.io = dataclasses.replace(bus.io, deadline=1.0)
         context = multiprocessing.get_context("spawn")
         done = context.Event()
         working = context.Event()

@@ -172,6 +172,7 @@ class ArmBus:
         """
         self.poll(now)
         self._counts["overruns"] += overruns
+        self._follower.fall_behind(overruns)
         if self._is_cyclic and not self._is_lost:
             self._note_measured()
             self._count_missing()
@@ -297,11 +298,10 @@ class ArmBus:
         follower = self._follower
         if self.phase != Phase.ENABLED and not follower.is_braking:
             return
-        elapsed = 0.0 if self._last_cycle is None else now - self._last_cycle
-        problem = follower.step(now, elapsed)
+        problem = follower.step(now)
         if problem is not None:
             self.stop(problem)
-            follower.step(now, elapsed)
+            follower.step(now)
         self.io.trigger = follower.trigger
         axes = axes_from_joints(follower.q)
         for drive, angle in zip(self.drives, axes, strict=True):

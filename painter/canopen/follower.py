@@ -19,6 +19,9 @@ TARGET_CYCLES = 2
 # The valve's output is sent at once. Setpoints and cycles both round the time of an
 # edge up, by half a cycle on average: one cycle ahead, edges are on time on average.
 TRIGGER_CYCLES = 1
+# Share by which the arm is faster until a skipped cycle is made up for; below what the
+# guard forgives.
+CATCH_UP = 0.02
 
 
 class SetpointFollower:
@@ -52,6 +55,7 @@ class SetpointFollower:
         self._guard = SetpointGuard(joints, timeout)
         self._buffer = SetpointBuffer()
         self._ramp: StopRamp | None = None
+        self._behind = 0.0
         self.q, self.v, self.trigger = np.zeros(5), np.zeros(5), 0.0
 
     def __len__(self) -> int:
@@ -90,18 +94,27 @@ class SetpointFollower:
     def brake(self, now: float) -> None:
         """Begins a controlled stop from the present command; the gun closes."""
         self.release()
-        self._ramp = StopRamp(now, self.q, self.v, self._joints)
+        self._ramp = StopRamp(now - self._behind, self.q, self.v, self._joints)
 
-    def step(self, now: float, elapsed: float) -> str | None:
+    def fall_behind(self, cycles: int) -> None:
+        """Lets the setpoints wait for cycles that were skipped.
+
+        Drives take a target a cycle: two cycles' way in one would be twice as fast.
+        What is behind is made up for slowly.
+        """
+        self._behind += cycles * self._cycle
+
+    def step(self, now: float) -> str | None:
         """Goes on to the command of a cycle.
 
         Args:
             now: When the cycle was due, s.
-            elapsed: Time since the one before, s.
 
         Returns:
             Why the setpoints were not followed (the arm brakes then), or None.
         """
+        self._behind = max(0.0, self._behind - CATCH_UP * self._cycle)
+        now -= self._behind
         if self._ramp is not None:
             self._take(self._ramp.sample(now))
             return None
@@ -113,9 +126,9 @@ class SetpointFollower:
             # Late, but not yet too late: go on as the last setpoint said.
             moved = sample.q + sample.v * sample.lag
             sample = Sample(moved, sample.v, sample.trigger, sample.lag)
-        problem = self._guard.objection(sample, self.q, max(elapsed, self._cycle))
+        problem = self._guard.objection(sample, self.q, self._cycle)
         if problem is not None:
-            self.brake(now)
+            self.brake(now + self._behind)
             return problem
         self._take(sample)
         self.trigger = self._buffer.trigger(now + TRIGGER_CYCLES * self._cycle)

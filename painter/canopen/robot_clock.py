@@ -1,5 +1,6 @@
 """The diagram's time and the bus's clock."""
 
+import math
 from typing import Protocol
 
 from painter.canopen.bus_process import Report
@@ -81,8 +82,16 @@ class RobotClock:
         return time + self._offsets[-1][1]
 
     def diagram_time(self, bus_time: float) -> float:
-        """Returns the diagram's time, s, of a moment on the bus's clock, s."""
-        return bus_time - self._offsets[-1][1]
+        """Returns the diagram's time, s, of a moment on the bus's clock, s.
+
+        All moments at which the diagram's clock stood still are one time of it.
+        """
+        after = math.inf
+        for start, offset in reversed(self._offsets):
+            if bus_time - offset >= start:
+                break
+            after = start
+        return min(bus_time - offset, after)
 
     def due(self, time: float) -> float:
         """Returns when the diagram may come to a time, s, on the bus's clock, s."""

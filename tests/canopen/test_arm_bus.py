@@ -272,6 +272,29 @@ def test_the_bus_load_is_below_40_per_cent(lab):
     assert lab.master.feedback().statistics.load == pytest.approx(load, rel=0.02)
 
 
+def test_a_skipped_cycle_makes_the_arm_wait_and_not_jump(lab, make_lab):
+    lab.bus.io = dataclasses.replace(lab.bus.io, deadline=0.1)
+    lab = make_lab(lab.bus).bring_up()
+    lab.sway(amplitude=0.55)  # 1.73 rad/s, of 2 that are allowed.
+    lab.run(0.45)
+    lab.cycles += 1
+    lab.rack.advance(lab.now)
+    lab.master.cycle(lab.now, overruns=1)
+    lab.cycles += 1
+    speed = []
+    lab.rack.stepped = lambda: speed.append(lab.rack.drives["base_yaw"].demand.velocity)
+    lab.run(0.5)
+    assert lab.master.phase == Phase.ENABLED, lab.master.reason
+    counts = 65536 * 100 / (2 * np.pi)
+    assert np.abs(speed).max() / counts < 1.73 * 1.03
+    # 5 ms are made up for at 2 % in 0.25 s.
+    path, samples = lab.path, []
+    lab.master.measured = lambda *sample: samples.append(sample)
+    lab.run(0.2)
+    worst = max(np.abs(q - path(time)[0]).max() for time, q, _, _ in samples)
+    assert worst < 1e-3
+
+
 def test_switching_off_closes_the_brakes(lab):
     lab.master.shut_down()
     lab.until(lambda: lab.master.phase == Phase.DOWN)

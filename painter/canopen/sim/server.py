@@ -21,8 +21,8 @@ _MOST_AT_ONCE = 2.0 * STEP
 # How long the rack's time waits for a SYNC that is due, s: what this computer's
 # scheduler does to either process is not of the bus.
 _PATIENCE = 0.05
-# A SYNC that comes a cycle late, less this, s, is the one after the one that was due.
-_EARLY = 0.001
+# How fast the run's clock may be found to be late on the SYNCs' time, s a SYNC.
+_CREEP = 0.0001
 
 
 class LocalHub:
@@ -115,7 +115,8 @@ class RackServer:
     Attributes:
         rack: The simulated nodes.
         slips: How often the rack's time fell behind for good.
-        sync_late: Longest time that the rack waited for a SYNC, s by the run's clock.
+        sync_late: Longest time from when a SYNC was due until it was taken, s by the
+            run's clock.
     """
 
     def __init__(
@@ -138,13 +139,12 @@ class RackServer:
         self._send = self.rack.wire.attach(self._to_link)
         self._clock = clock or TimeBase()
         # The run's clock at the rack's time 0, s: as the rack's own clock has it, which
-        # follows each SYNC, and as those SYNCs have it that were least late.
+        # follows each SYNC, and as those of the last ones have it that were least late.
         self._start = self._origin = self._clock.now()
         self.slips = 0
         self.sync_late = 0.0
         # When the next SYNC is due in the rack's time, s.
         self._sync_due = math.inf
-        self._looked = 0.0  # When frames were last looked for, s.
 
     def run(self, is_done: Callable[[float], bool]) -> None:
         """Runs until `is_done`, which is asked about every ms with the rack's time."""
@@ -179,10 +179,9 @@ class RackServer:
     def _serve(self) -> None:
         frames = self._receive(self._clock.machine(self._wait(self._now())))
         now = self._now()
-        looked, self._looked = self._looked, now
         for frame in frames:
             if frame.cob_id == SYNC_ID:
-                now = self._looked = self._take_sync(now, looked)
+                now = self._take_sync(now)
             if not frame.is_error:  # Of this computer's controller; no node sees it.
                 # Held up, this process cannot know when it came: before the next step.
                 self._send(frame, self.rack.now)
@@ -205,27 +204,24 @@ class RackServer:
                 self._link.reopen()
         return []
 
-    def _take_sync(self, now: float, looked: float) -> float:
-        """Goes on to a SYNC that came after `looked` and by now; returns its time, s.
+    def _take_sync(self, now: float) -> float:
+        """Goes on to a SYNC that has come by now; returns its time in the rack, s.
 
-        From then on the rack's clock goes on. The first one after long is on the next
+        It is a cycle after the one before; the first one after long is on the next
         whole step.
         """
-        cycle, due = self.rack.bus.cycle, self._sync_due
+        due = self._sync_due
         is_new = math.isinf(due) or now > due + _PATIENCE
         if is_new:
-            when = max(now, self.rack.now) + 0.5 * STEP
+            due = max(now, self.rack.now) + 0.5 * STEP
         else:
-            # How many were due in between, and were not sent.
-            skipped = math.floor((looked - due + _EARLY) / cycle)
-            when = due + max(0, skipped) * cycle
-            self.sync_late = max(self.sync_late, looked - when)
-        when = STEP * round(when / STEP)
+            self.sync_late = max(self.sync_late, now - due)
+        when = STEP * round(due / STEP)
         self._start += now - when
-        if is_new or self._start < self._origin:
-            self._origin = self._start
+        latest = self._start if is_new else self._origin + _CREEP
+        self._origin = min(self._start, latest)
         self.rack.advance(when)
-        self._sync_due = when + cycle
+        self._sync_due = when + self.rack.bus.cycle
         return when
 
     def _to_link(self, frame: Frame, now: float) -> None:
