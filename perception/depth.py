@@ -77,7 +77,7 @@ def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolAr
     jump = np.minimum(np.float32(config.edge_jump) * depth, step * depth**2)
     # What is left of far areas has lost a pixel along its edges, and gets it back.
     far = moving_max(moving_min(depth, 3), config.edge_window + 2)
-    usable = seen & (far - depth <= jump)
+    usable: BoolArray = seen & (far - depth <= jump)
     usable &= depth - moving_min(depth, 3) <= jump
     usable &= (depth >= 1000 * config.min_range) & (depth <= 1000 * config.max_range)
     return usable
