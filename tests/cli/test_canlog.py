@@ -76,8 +76,9 @@ def test_figures_name_what_went_wrong(log, capsys):
     assert found["sync_period_s"] == pytest.approx(0.005, abs=1e-6)
     assert len(found["errors"]) == 1
     assert "elbow_pitch emcy 3220h" in found["errors"][0]
-    # Five drives at 200 Hz, worst-case bits, second TPDOs every other cycle.
-    assert 0.2 < found["bus_load"] <= 0.4
+    # Five drives at 200 Hz, worst-case bits: 0.35 (test_arm_bus.py counts them). What
+    # bring-up reads and writes comes on top, in a log of a second.
+    assert 0.2 < found["bus_load"] <= 0.45
 
 
 def test_only_what_is_asked_for_is_shown(log, capsys):
