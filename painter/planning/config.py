@@ -158,7 +158,7 @@ class RasterConfig:
     min_stroke: float = 0.03
     wall_share: float = 0.5
     cut_in: bool = True
-    cut_in_standoff: float = 0.10
+    cut_in_standoff: float = 0.06
     coats: int = 1
     flash_off: float = 60.0
     direction: str = "vertical"
@@ -188,9 +188,9 @@ class RasterConfig:
             raise ValueError(
                 f"raster.flash_off must be >= 0 s, got {self.flash_off!r}."
             )
-        if not 0.08 <= self.cut_in_standoff < 1.0:
+        if not 0.05 <= self.cut_in_standoff < 1.0:
             raise ValueError(
-                "raster.cut_in_standoff must be 0.08 to 1 m, got "
+                "raster.cut_in_standoff must be 0.05 to 1 m, got "
                 f"{self.cut_in_standoff!r}."
             )
         for name in ("overlap_pitch", "lead", "keepout_margin", "min_stroke"):

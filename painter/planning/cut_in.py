@@ -21,6 +21,7 @@ from perception.values import BoolArray, FloatArray, IntArray
 _SPACING = 0.02  # m, between candidate lines ...
 _SPACING_IN_SPOTS = 0.01  # ... and where only some spots are looked at.
 _ROUNDS = 10
+_WIDER = (1.5, 2.2)  # Shares of the least stand-off that are tried as well.
 # Flow of candidates, as share of what keeps the film's thickness at their stand-off.
 _FLOWS = np.array([0.6, 0.75, 0.9, 1.05, 1.25])
 _THIN = 0.9  # Film below which a line is worth looking at.
@@ -44,16 +45,20 @@ def find_cut_ins(
         fit: Gets the strokes.
         model: Film on the site.
         tip: The spray tip.
-        raster: `cut_in_standoff` is the nearest to the wall; where things stand out,
-            half way to `standoff` is tried as well.
+        raster: `cut_in_standoff` is the nearest to the wall; wider strokes are tried
+            as well, where things stand out from half way to `standoff`.
         where: (ny, nx) of the site, cells for whose sake strokes are added, from
             `standoff` too where many of them lie together; None = those beside edges.
     """
     site = model.site
     near = raster.cut_in_standoff
     standoffs = [near]
-    if (site.height > 0.2 * near).any():
+    if site.stands_out:
         standoffs.append(0.5 * (near + raster.standoff))
+    else:
+        standoffs += [
+            wider * near for wider in _WIDER if wider * near < raster.standoff
+        ]
     if where is not None:
         standoffs.append(raster.standoff)
     spacing = _SPACING if where is None else _SPACING_IN_SPOTS
@@ -163,7 +168,7 @@ class _Candidate:
         flows = self._flows
         table = np.zeros((rows.size, flows.size))
         trial = film[rows] + flows[:, None, None] * line.film[rows]
-        cells = FilmCost.coarse()(trial, wanted[rows], site.clean[rows, window])
+        cells = FilmCost.coarse(site)(trial, wanted[rows], site.clean[rows, window])
         table[rows] = cells.sum(axis=2).T * site.cell**2
         table[~rows, 1:] = _NEVER
         table[~self._room, 1:] = _NEVER

@@ -17,7 +17,11 @@ from painter.planning.film_model import FilmModel, Line
 from perception.values import BoolArray, FloatArray, IntArray
 
 # Steps across, along (m), of flow (share) and stand-off (m): coarse, then fine.
-_STEPS = ((0.01, 0.01, 0.10, 0.03), (0.004, 0.005, 0.04, 0.0))
+_STEPS = (
+    (0.01, 0.01, 0.10, 0.03),
+    (0.004, 0.005, 0.04, 0.01),
+    (0.0015, 0.003, 0.015, 0.004),
+)
 _PASSES = 6  # At most, with steps of one size.
 _REPEATS = 4  # Of a step that helped.
 # A shorter stroke need not lean: its ends move instead. Beyond 0.3 m/m, 17 deg, the
@@ -107,6 +111,7 @@ class FilmFit:
         size = 2 * round(_GUN_REACH / site.cell) + 1
         self._tops = maximum_filter(site.height, size=size) + _GUN_FRONT
         self._tops[self._tops <= _GUN_FRONT] = 0.0  # The wall has its own clearance.
+        self._tops = np.maximum(self._tops, site.nearest)
         # While spans are fitted: what each cell costs, and at which change of the film
         # it last changed.
         self._costs: FloatArray = np.zeros(site.wanted.shape)
@@ -119,7 +124,7 @@ class FilmFit:
         return tuple(laid.span for laid in self._laid)
 
     def room(self, x: FloatArray, standoff: float, lean: float = 0.0) -> BoolArray:
-        """Returns the rows on which the gun clears what stands out.
+        """Returns the rows on which the gun clears what stands out and is in reach.
 
         Args:
             x: (n,) m, lines, where they meet T y = 0.

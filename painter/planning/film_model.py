@@ -22,6 +22,7 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 
 # Beyond the tile's edges by so much the film is looked at, m: more than half a fan.
 MARGIN = 0.14
+_STANDS_OUT = 0.02  # m before the wall; less than that hardly shades it.
 _TABLE = np.linspace(-1.0, 1.0, 2001)
 _BLOCK = 16  # Rows of a line that are made together.
 
@@ -39,6 +40,7 @@ class Site(FrozenValue):
         wanted: (ny, nx) bool, to be painted.
         clean: (ny, nx) bool, in the tile and to stay clean.
         height: (ny, nx) m, along T z.
+        nearest: (ny, nx) m, least stand-off from which the arm can spray there.
         cell: Edge of a cell, m; cell (0, 0) begins at -`border` cells in T.
         border: Cells of margin on each side.
     """
@@ -46,12 +48,17 @@ class Site(FrozenValue):
     wanted: BoolArray
     clean: BoolArray
     height: FloatArray
+    nearest: FloatArray
     cell: float
     border: int
 
     @classmethod
     def of_tile(
-        cls, mask: BoolArray, cell: float, height: FloatArray | None = None
+        cls,
+        mask: BoolArray,
+        cell: float,
+        height: FloatArray | None = None,
+        nearest: FloatArray | None = None,
     ) -> "Site":
         """Makes the site of a tile.
 
@@ -60,16 +67,25 @@ class Site(FrozenValue):
             cell: Edge of a cell, m.
             height: (ny, nx) m along T z, NaN = nothing seen there; what lies
                 farther back than the margin is taken there. None = a plane.
+            nearest: (ny, nx) m, on the tile and the margin, the least stand-off that
+                the arm's reach allows; None = any.
         """
         border = margin_cells(cell)
+        wanted = np.pad(mask, border)
         flat = np.zeros(mask.shape) if height is None else np.where(mask, 0.0, height)
         return cls(
-            wanted=np.pad(mask, border),
+            wanted=wanted,
             clean=np.pad(~mask, border),
             height=np.pad(np.fmax(flat, -MARGIN), border),
+            nearest=np.zeros(wanted.shape) if nearest is None else nearest,
             cell=cell,
             border=border,
         )
+
+    @functools.cached_property
+    def stands_out(self) -> bool:
+        """Whether anything on the tile stands out of the wall and shades it."""
+        return bool((self.height > _STANDS_OUT).any())
 
     @functools.cached_property
     def deepest(self) -> float:

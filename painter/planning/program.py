@@ -14,7 +14,7 @@ from painter.planning.clear_strokes import (
     nozzle_points,
 )
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
-from painter.planning.film_model import Site
+from painter.planning.film_model import Site, margin_cells
 from painter.planning.gun_path import Pass, SquareGun, ToolMove
 from painter.planning.joint_motion import (
     Segment,
@@ -27,9 +27,11 @@ from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.planning.linker import Linker, end_q
 from painter.planning.obstacles import ClearSpace, segmentation_boxes
 from painter.planning.raster import plan_strokes, raster_film
+from painter.planning.reach import nearest_standoffs
 from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
 from painter.planning.stroke_order import order_strokes
 from painter.planning.surface_frame import SurfaceFrame, above_wall
+from painter.planning.tile import cell_centres
 from painter.planning.touch_up import touch_up_strokes
 from painter.planning.verify import verify_motion, verify_strokes
 from painter.planning.zones import in_zones
@@ -74,6 +76,7 @@ class ProgramPlanner(FrozenValue):
             tip=self.tip,
             raster=self.raster,
             height=above_wall(segmentation),
+            nearest=self._nearest(segmentation),
         )
 
     def wanted(self, segmentation: WallSegmentation) -> BoolArray:
@@ -90,10 +93,15 @@ class ProgramPlanner(FrozenValue):
             segmentation: Of the tile.
             film: m, on the tile and `margin_cells` around it.
         """
-        depth = above_wall(segmentation)
+        site = Site.of_tile(
+            self.wanted(segmentation),
+            segmentation.cell,
+            above_wall(segmentation),
+            self._nearest(segmentation),
+        )
         return touch_up_strokes(
             film,
-            Site.of_tile(self.wanted(segmentation), segmentation.cell, depth),
+            site,
             nominal=self.nominal_film(segmentation),
             tip=self.tip,
             raster=self.raster,
@@ -123,8 +131,7 @@ class ProgramPlanner(FrozenValue):
             MotionLimitError: The finished motion fails its verification.
         """
         motion, limits = self.motion, self.limits
-        surface = SurfaceFrame.of_wall(segmentation)
-        gun = SquareGun(self.kinematics, segmentation.X_WT, surface)
+        gun = self._gun(segmentation)
         space = ClearSpace(
             self.checker,
             X_WT=segmentation.X_WT,
@@ -171,9 +178,27 @@ class ProgramPlanner(FrozenValue):
             program,
             kinematics=self.kinematics,
             valve_delay=self.tip.valve_delay,
-            surface=surface,
+            surface=gun.surface,
         )
         return program
+
+    def _gun(self, segmentation: WallSegmentation) -> SquareGun:
+        """Returns the gun before a wall; it follows the wall's surface."""
+        surface = SurfaceFrame.of_wall(segmentation)
+        return SquareGun(self.kinematics, segmentation.X_WT, surface)
+
+    def _nearest(self, segmentation: WallSegmentation) -> FloatArray:
+        """Returns the least stand-offs on a tile, as `Site` has them."""
+        cell = segmentation.cell
+        border = margin_cells(cell)
+        ny, nx = (size + 2 * border for size in segmentation.wall_mask.shape)
+        return nearest_standoffs(
+            *cell_centres((ny, nx), cell, margin=border * cell),
+            gun=self._gun(segmentation),
+            limits=self.limits,
+            near=self.raster.cut_in_standoff,
+            far=self.raster.standoff,
+        )
 
 
 def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke, ...]:

@@ -29,9 +29,11 @@ from painter.planning.zones import in_zones
 from perception.values import BoolArray, FloatArray
 
 # Of a line of the raster, before it is fitted: most of the flow that may land on what
-# stays clean, least that must land on wall to be painted, and the same where something
-# that stays clean is in the fan's reach.
+# stays clean, the same on a tile of openings alone, beside which narrower strokes do
+# better, least that must land on wall to be painted, and the same where something that
+# stays clean is in the fan's reach.
 _MOST_SOILING = 0.03
+_MOST_SOILING_OPENING = 0.003
 _LEAST_USE = 0.35
 _LEAST_USE_NARROW = 0.93
 _SAME_LINE = 0.002  # m
@@ -44,6 +46,7 @@ def plan_strokes(
     tip: TipConfig,
     raster: RasterConfig,
     height: FloatArray | None = None,
+    nearest: FloatArray | None = None,
 ) -> tuple[Stroke, ...]:
     """Plans the strokes of a tile.
 
@@ -60,6 +63,7 @@ def plan_strokes(
         raster: Settings of the raster.
         height: (ny, nx) m, along T z, what stands out or lies back, NaN = nothing
             seen; None = a plane. For cut-in.
+        nearest: Least stand-offs, as `Site` has them; None = any. For cut-in.
 
     Returns:
         Strokes from the left, coat by coat; none where nothing is to be painted.
@@ -79,7 +83,7 @@ def plan_strokes(
     lines = place_lines(paintable, cell, tip=tip, raster=raster)
     if not raster.cut_in:
         return _strokes_on(lines, paintable, cell, tip=tip, raster=raster)
-    site = Site.of_tile(paintable, cell, height)
+    site = Site.of_tile(paintable, cell, height, nearest)
     # Coats alternate between the lines and those half way between them.
     width = mask.shape[1] * cell
     phases = (lines, lines_between(lines, width))[: raster.coats]
@@ -142,6 +146,7 @@ def _body_spans(
     """Returns where the lines of the raster do no harm: the rest is for cut-in."""
     site = model.site
     spans: list[Span] = []
+    most_soiling = _MOST_SOILING if site.stands_out else _MOST_SOILING_OPENING
     for x_line, room in zip(lines, fit.room(lines, raster.standoff).T, strict=True):
         line = model.line(float(x_line), raster.standoff)
         window = slice(*line.columns)
@@ -151,7 +156,7 @@ def _body_spans(
         # Where the wall is narrower than the fan, narrow strokes do better.
         narrow = site.clean[:, window].any(axis=1)
         least = np.where(narrow, _LEAST_USE_NARROW, _LEAST_USE)
-        on = room & (soiling < _MOST_SOILING * flow) & (useful > least * flow)
+        on = room & (soiling < most_soiling * flow) & (useful > least * flow)
         for first, end in np.flatnonzero(
             np.diff(on, prepend=False, append=False)
         ).reshape(-1, 2):

@@ -1,5 +1,7 @@
 """Whether the arm reaches what it is asked for, and if not, by how much."""
 
+import math
+
 import numpy as np
 
 from painter.errors import ReachError
@@ -7,6 +9,9 @@ from painter.planning.gun_path import SquareGun
 from painter.planning.kinematics import ArmLimits
 from perception.values import FloatArray
 
+_REACH_STEP = 0.05  # m, between the places at which reach is asked for ...
+_STANDOFF_STEP = 0.015  # m, ... and between the stand-offs.
+_STOPPING = 0.10  # m, in which the gun stops beyond a stroke's end at 0.6 m/s.
 _JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
 
@@ -25,6 +30,51 @@ def tile_points(width: float, height: float, standoff: float) -> FloatArray:
     y = np.linspace(0.0, height, max(2, round(height / 0.1) + 1))
     xs, ys = np.meshgrid(x, y)
     return np.stack([xs.ravel(), ys.ravel(), np.full(xs.size, standoff)], axis=-1)
+
+
+def nearest_standoffs(
+    x: FloatArray,
+    y: FloatArray,
+    *,
+    gun: SquareGun,
+    limits: ArmLimits,
+    near: float,
+    far: float,
+) -> FloatArray:
+    """Returns the least stand-offs from which strokes along T y can be sprayed.
+
+    The nearer the nozzle, the farther the arm has to stretch in a tile's corners. A
+    stroke may end wherever it may be: there must be room to stop beyond.
+
+    Args:
+        x: (nx,) m in T, ascending.
+        y: (ny,) m in T, ascending.
+        gun: Inverse kinematics.
+        limits: Of the joints.
+        near: Least stand-off that is asked for, m.
+        far: Of the raster, m; whether the arm reaches that is asked elsewhere.
+
+    Returns:
+        (ny, nx) m, `near` to `far`.
+    """
+    columns, rows = (_spread(axis, _REACH_STEP) for axis in (x, y))
+    standoffs = np.linspace(near, far, max(2, round((far - near) / _STANDOFF_STEP) + 1))
+    # Away from the middle is where reach ends.
+    beyond = rows + _STOPPING * np.sign(rows - rows.mean())
+    places = np.meshgrid(standoffs, beyond, columns, indexing="ij")
+    p_TGs = np.stack([place.ravel() for place in places[::-1]], axis=-1)
+    reached = limits.contains(gun.solve(p_TGs)).reshape(places[0].shape)
+    # Out of reach up to the last stand-off at which it is.
+    first = np.where(reached, 0, np.arange(1, standoffs.size + 1)[:, None, None])
+    coarse = standoffs[np.minimum(first.max(axis=0), standoffs.size - 1)]
+    by_row = np.array([np.interp(x, columns, row) for row in coarse])
+    return np.stack([np.interp(y, rows, column) for column in by_row.T], axis=1)
+
+
+def _spread(axis: FloatArray, step: float) -> FloatArray:
+    """Returns evenly spaced places from one end of an axis to the other."""
+    count = max(2, math.ceil((axis[-1] - axis[0]) / step) + 1)
+    return np.linspace(axis[0], axis[-1], count)
 
 
 def require_reach(

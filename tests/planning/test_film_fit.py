@@ -242,7 +242,7 @@ def test_coats_share_the_film_and_alternate_their_lines(coats):
     )
     middles = 0.5 * (first[1:] + first[:-1])[3:-3]
     nearest = np.abs(middles[:, None] - second).min(axis=1)
-    assert nearest.max() <= 0.005  # The fit's finest step across is 4 mm.
+    assert nearest.max() <= 0.010  # The fit's first step across is 10 mm.
     one = figures(mask, plan_strokes(mask, CELL, tip=TIP, raster=RASTER))
     all_ = figures(mask, strokes)
     assert all_["coverage"] >= one["coverage"]
@@ -308,6 +308,16 @@ def test_small_cubes_stay_clean():
             beside = x - 0.06 < s.start_T[0] < x + 0.16
             if beside and low < y + 0.16 and high > y - 0.06:
                 assert s.standoff >= 0.14
+
+
+def test_strokes_keep_to_the_stand_offs_that_the_arm_reaches():
+    mask = wall((0.20, 0.0, 0.9, 1.85))
+    nearest = np.zeros(model(mask).site.wanted.shape)
+    nearest[:40] = 0.20  # The margin's 15 rows and 25 cm of the tile.
+    strokes = plan_strokes(mask, CELL, tip=TIP, raster=RASTER, nearest=nearest)
+    low = [s for s in strokes if min(s.start_T[1], s.end_T[1]) < 0.25 - 1e-6]
+    assert min(s.standoff for s in low) >= 0.20
+    assert min(s.standoff for s in strokes) < 0.15
 
 
 def test_nearer_and_weaker_leaves_a_narrower_film_as_thick():
