@@ -133,47 +133,49 @@ class _Candidate:
     ) -> None:
         self.x, self.lean, self.standoff = x, lean, standoff
         self._room, self._flows = room, flows
+        # What was looked at last, row by row: the film, its costs, and if it is thin.
         self._film: FloatArray | None = None
-        self._table: FloatArray | None = None
+        self._table = np.zeros((room.size, flows.size))
+        self._thin = np.zeros(room.size, dtype=bool)
 
     def table(
         self, fit: FilmFit, model: FilmModel, beside: BoolArray, raster: RasterConfig
     ) -> FloatArray | None:
         """Returns costs (ny, flows), m², or None where nothing on the line is thin.
 
-        They are found anew only where the film under the line has changed.
+        They are found anew only on rows on which the film under the line has changed.
         """
+        site = model.site
         line = model.line(self.x, self.standoff, self.lean)
         window = slice(*line.columns)
         film = fit.film[:, window]
-        if self._film is None or not np.array_equal(film, self._film):
-            self._film = film.copy()
-            self._table = self._costs(line, film, window, model.site, beside, raster)
+        if self._film is None:
+            self._film, rows = film.copy(), np.arange(len(film))
+        else:
+            rows = np.flatnonzero((film != self._film).any(axis=1))
+            self._film[rows] = film[rows]
+        if rows.size:
+            self._look(rows, line, window, site, beside)
+        if self._thin.sum() * site.cell < raster.min_stroke:
+            return None
         return self._table
 
-    def _costs(
-        self,
-        line: Line,
-        film: FloatArray,
-        window: slice,
-        site: Site,
-        beside: BoolArray,
-        raster: RasterConfig,
-    ) -> FloatArray | None:
-        wanted = site.wanted[:, window]
-        thin = wanted & (film < _THIN) & beside[:, window] & (line.film > 0.0)
-        rows = thin.any(axis=1)
-        if rows.sum() * site.cell < raster.min_stroke:
-            return None
-        flows = self._flows
-        table = np.zeros((rows.size, flows.size))
-        trial = film[rows] + flows[:, None, None] * line.film[rows]
-        cells = FilmCost.coarse(site)(trial, wanted[rows], site.clean[rows, window])
-        table[rows] = cells.sum(axis=2).T * site.cell**2
-        table[~rows, 1:] = _NEVER
-        table[~self._room, 1:] = _NEVER
+    def _look(
+        self, rows: IntArray, line: Line, window: slice, site: Site, beside: BoolArray
+    ) -> None:
+        """Finds the costs on some rows."""
+        assert self._film is not None
+        film, full = self._film[rows], line.film[rows]
+        wanted, clean = site.wanted[rows, window], site.clean[rows, window]
+        thin = wanted & (film < _THIN) & beside[rows, window] & (full > 0.0)
+        on = thin.any(axis=1)
+        trial = film[on] + self._flows[:, None, None] * full[on]
+        cells = FilmCost.coarse(site)(trial, wanted[on], clean[on])
+        table = np.zeros((rows.size, self._flows.size))
+        table[on] = cells.sum(axis=2).T * site.cell**2
+        table[~(on & self._room[rows]), 1:] = _NEVER
         table[:, 1:] += (stroke_cost(1.0) - stroke_cost(0.0)) * site.cell
-        return table
+        self._table[rows], self._thin[rows] = table, on
 
     def spans(self, levels: IntArray, site: Site, raster: RasterConfig) -> list[Span]:
         """Returns the spans of a choice of flows (ny,) by their number."""
