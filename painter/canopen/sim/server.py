@@ -221,6 +221,10 @@ class RackServer:
         latest = self._start if is_new else self._origin + _CREEP
         self._origin = min(self._start, latest)
         self.rack.advance(when)
+        # What came before it is heard before it: two targets at the next SYNC would be
+        # two cycles' way in one.
+        while (end := self.rack.wire.next_end()) is not None:
+            self.rack.wire.advance(end)
         self._sync_due = when + self.rack.bus.cycle
         return when
 
