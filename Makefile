@@ -14,7 +14,8 @@ SYSTEM_PACKAGES := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libgomp1 libusb-1
   libx11-6
 # These measure what is found, not how fast, in hours.
 LONG_BENCHES := $(patsubst %,benchmarks/bench_%.py,\
-  edges fine_steps hil low_plates map map_recordings masks masks_pcl)
+  edge_bound edges fine_steps hil low_plates map map_recordings masks masks_pcl \
+  scanned_film)
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
 .PHONY: help setup browser demo test test-all test-socketcan lint format bench bench-all \

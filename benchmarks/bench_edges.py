@@ -17,6 +17,7 @@ weighed more and more.
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -33,9 +34,9 @@ from perception.values import BoolArray, FloatArray
 CELL = 0.01
 TIP = TipConfig()
 COVERED, SOILED = 0.8, 0.1
-STANDOFFS = (0.30, 0.20, 0.12, 0.10, 0.08)  # m, of the strokes beside edges.
+STANDOFFS = (0.30, 0.20, 0.10, 0.08, 0.06)  # m, of the strokes beside edges.
 FLOWS = (1.0, 1.25, 1.5)  # Peak of such a stroke's film, as share of nominal.
-WEIGHTS = (0.1, 0.2, 0.4, 0.8, 1.6)  # Of soiled cells; the planner's own is 0.8.
+WEIGHTS = (0.4, 0.8, 1.6, 3.2)  # Of soiled cells; the planner's own is 1.6.
 ASKED = {"terrace": (0.96, 0.03), "room": (0.96, 0.03)}  # Coverage, keepout_paint.
 
 
@@ -156,13 +157,10 @@ def planned(
     mask: BoolArray, height: FloatArray, standoff: float, weight: float
 ) -> tuple[float, float, float, float]:
     """Returns coverage, soiled share, overspray and CV of the planner's strokes."""
-    own = film_cost._SOILED
-    film_cost._SOILED = weight
-    try:
-        raster = RasterConfig(cut_in_standoff=standoff)
+    raster = RasterConfig(cut_in_standoff=standoff)
+    weights = film_cost._OPENINGS._replace(soiled=weight)
+    with mock.patch.object(film_cost, "_OPENINGS", weights):
         strokes = plan_strokes(mask, CELL, tip=TIP, raster=raster, height=height)
-    finally:
-        film_cost._SOILED = own
     nominal = raster_film(mask.shape[1] * CELL, tip=TIP, raster=raster)
     site = Site.of_tile(mask, CELL, height)
     film = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal).film(strokes)
