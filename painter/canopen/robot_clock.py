@@ -93,6 +93,17 @@ class RobotClock:
             after = start
         return min(bus_time - offset, after)
 
+    def picture_time(self, bus_time: float) -> float:
+        """Returns `diagram_time`, s; NaN for a moment at which that clock stood still.
+
+        The arm still carried out commands then: it was nowhere that the diagram knows.
+        """
+        time = self.diagram_time(bus_time)
+        offsets = (offset for start, offset in reversed(self._offsets) if start <= time)
+        return (
+            time if any(abs(time + o - bus_time) < 1e-6 for o in offsets) else math.nan
+        )
+
     def due(self, time: float) -> float:
         """Returns when the diagram may come to a time, s, on the bus's clock, s."""
         return self.bus_time(time) + self.lag

@@ -64,7 +64,7 @@ def MakeHardwareStation(scenario: Scenario, body: Body) -> Diagram:
             color_width=config.color_width,
             color_height=config.color_height,
             period=CAMERA_PERIOD,
-            diagram_time=body.clock.diagram_time,
+            diagram_time=body.clock.picture_time,
         ),
     )
     builder.Connect(camera.GetOutputPort("status"), arm.GetInputPort("camera_status"))

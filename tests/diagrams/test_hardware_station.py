@@ -159,6 +159,10 @@ def test_a_clock_that_is_held_maps_times_on_both_sides():
     assert clock.diagram_time(104.0) == pytest.approx(4.0)
     assert clock.diagram_time(106.0) == pytest.approx(5.0)
     assert clock.diagram_time(99.0) == pytest.approx(-1.0)
+    # While it ran the arm carried out what had been commanded: no pose fits.
+    assert np.isnan(clock.picture_time(106.0))
+    assert clock.picture_time(104.0) == pytest.approx(4.0)
+    assert clock.picture_time(108.0) == pytest.approx(6.0)
     times = robot_times(np.array([99.0, 104.0, 106.0, 107.5]), clock)
     np.testing.assert_allclose(times, [np.nan, 4.0, np.nan, 5.5])
     stamps = executions(np.array([4.99, 5.0, 6.0]), clock)
