@@ -7,9 +7,11 @@ of its own:
 """
 
 import importlib.util
+import itertools
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -40,29 +42,9 @@ def read_bag(path: Path) -> FloatArray:
         CloudReadError: The file is missing or unusable, or pyrealsense2 is not
             installed; names the reason.
     """
-    check_file(path)
-    if importlib.util.find_spec("pyrealsense2") is None:
-        raise CloudReadError(
-            f"{path}: reading RealSense recordings needs pyrealsense2; "
-            "install it with: pip install 'painter[hardware]'."
-        )
     with tempfile.TemporaryDirectory() as folder:
         frames = Path(folder) / "frames.npz"
-        words = [sys.executable, "-m", "perception.bag_io", str(path), str(frames)]
-        try:
-            done = subprocess.run(
-                words, capture_output=True, timeout=_TIMEOUT, check=False
-            )
-        except subprocess.TimeoutExpired as error:
-            raise CloudReadError(
-                f"{path}: librealsense took over {_TIMEOUT:g} s."
-            ) from error
-        if done.returncode != 0 or not frames.exists():
-            reason = done.stderr.decode(errors="replace").strip().splitlines()
-            raise CloudReadError(
-                f"{path}: librealsense cannot read it: "
-                f"{reason[-1] if reason else f'it ended with {done.returncode}'}."
-            )
+        play_apart("perception.bag_io", path, frames, timeout=_TIMEOUT)
         with np.load(frames) as content:
             depth, numbers = content["depth"], content["camera"]
     height, width = depth.shape
@@ -71,29 +53,91 @@ def read_bag(path: Path) -> FloatArray:
     return checked_points(path, camera.points(depth))
 
 
-def _play(path: str) -> tuple[Any, Any]:
-    """Plays a recording; returns the depth in units and the camera's numbers."""
+def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
+    """Plays a recording in a process of its own.
+
+    Args:
+        module: Run as a program with the paths of recording and result; what it cannot
+            read it says in its last line.
+        path: A `.bag` or `.db3` file.
+        out: Where the result goes.
+        timeout: The process is given up after this time, s.
+
+    Raises:
+        CloudReadError: The file is missing or unusable, or pyrealsense2 is not
+            installed; names the reason.
+    """
+    check_file(path)
+    if importlib.util.find_spec("pyrealsense2") is None:
+        raise CloudReadError(
+            f"{path}: reading RealSense recordings needs pyrealsense2; "
+            "install it with: pip install 'painter[hardware]'."
+        )
+    words = [sys.executable, "-m", module, str(path), str(out)]
+    try:
+        done = subprocess.run(words, capture_output=True, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise CloudReadError(
+            f"{path}: librealsense took over {timeout:g} s."
+        ) from error
+    if done.returncode != 0 or not out.exists():
+        reason = done.stderr.decode(errors="replace").strip().splitlines()
+        raise CloudReadError(
+            f"{path}: librealsense cannot read it: "
+            f"{reason[-1] if reason else f'it ended with {done.returncode}'}."
+        )
+
+
+def depth_groups(path: str, *streams: Any) -> Iterator[tuple[Any, Any]]:
+    """Plays a recording's pictures, as fast as they are taken.
+
+    Args:
+        path: Of the recording.
+        *streams: Of librealsense, to be played alone; all if left out.
+
+    Yields:
+        Each depth frame, and the set of frames that it came in.
+
+    Raises:
+        ValueError: There is no depth picture.
+    """
     import pyrealsense2 as rs
 
     config, pipeline = rs.config(), rs.pipeline()
     rs.config.enable_device_from_file(config, path, repeat_playback=False)
-    config.enable_stream(rs.stream.depth)
+    for stream in streams:
+        config.enable_stream(stream)
     profile = pipeline.start(config)
     profile.get_device().as_playback().set_real_time(False)
-    frames: list[Any] = []
-    lens, scale = None, 0.001
-    while len(frames) < MAX_FRAMES:
+    empty = True
+    while True:
         there, group = pipeline.try_wait_for_frames(_FRAME_WAIT_MS)
         frame = group.get_depth_frame() if there else None
         if not frame:
             break
-        scale = frame.get_units()
-        lens = frame.profile.as_video_stream_profile().intrinsics
-        frames.append(np.array(frame.get_data()))
-    if lens is None:
+        empty = False
+        yield frame, group
+    if empty:
         raise ValueError("it has no depth pictures")
+
+
+def rectified_lens(frame: Any) -> Any:
+    """Returns the intrinsics of a depth frame; a ValueError says it is distorted."""
+    lens = frame.profile.as_video_stream_profile().intrinsics
     if any(lens.coeffs):
         raise ValueError(f"its depth is distorted ({lens.model}), not rectified")
+    return lens
+
+
+def _play(path: str) -> tuple[Any, Any]:
+    """Plays a recording; returns the depth in units and the camera's numbers."""
+    import pyrealsense2 as rs
+
+    frames: list[Any] = []
+    for frame, _ in itertools.islice(depth_groups(path, rs.stream.depth), MAX_FRAMES):
+        scale = frame.get_units()
+        lens = rectified_lens(frame)
+        frames.append(np.array(frame.get_data()))
     numbers = [lens.fx, lens.fy, lens.ppx, lens.ppy, scale]
     return median_depth(frames), numbers
 

@@ -6,9 +6,7 @@ of its own:
     python -m perception.mapping.bag RECORDING FOLDER
 """
 
-import importlib.util
 import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,13 +14,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from perception.cloud_io import check_file
-from perception.errors import CloudReadError
+from perception.bag_io import depth_groups, play_apart, rectified_lens
 from perception.mapping.frames import CAMERA_FILE
 
 TIMEOUT = 1800.0
 """A recording that takes longer to unpack is given up, s."""
-_FRAME_WAIT_MS = 2000
 _QUICK_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 
 
@@ -39,45 +35,19 @@ def unpack_bag(path: Path, folder: Path) -> None:
         CloudReadError: The file is missing or unusable, or pyrealsense2 is not
             installed; names the reason.
     """
-    check_file(path)
-    if importlib.util.find_spec("pyrealsense2") is None:
-        raise CloudReadError(
-            f"{path}: reading RealSense recordings needs pyrealsense2; "
-            "install it with: pip install 'painter[hardware]'."
-        )
-    words = [sys.executable, "-m", "perception.mapping.bag", str(path), str(folder)]
-    try:
-        done = subprocess.run(words, capture_output=True, timeout=TIMEOUT, check=False)
-    except subprocess.TimeoutExpired as error:
-        raise CloudReadError(
-            f"{path}: librealsense took over {TIMEOUT:g} s."
-        ) from error
-    if done.returncode != 0:
-        reason = done.stderr.decode(errors="replace").strip().splitlines()
-        raise CloudReadError(
-            f"{path}: librealsense cannot read it: "
-            f"{reason[-1] if reason else f'it ended with {done.returncode}'}."
-        )
+    play_apart("perception.mapping.bag", path, folder, timeout=TIMEOUT)
 
 
 def _play(path: str, folder: Path) -> None:
     """Plays a recording into files; its camera comes with the first picture."""
     import pyrealsense2 as rs
 
-    config, pipeline = rs.config(), rs.pipeline()
-    rs.config.enable_device_from_file(config, path, repeat_playback=False)
-    profile = pipeline.start(config)
-    profile.get_device().as_playback().set_real_time(False)
     align = rs.align(rs.stream.depth)
     for name in ("rgb", "depth"):
         (folder / name).mkdir()
     last = -1.0
     with (folder / "rgb.txt").open("w") as rgb, (folder / "depth.txt").open("w") as dep:
-        while True:
-            there, group = pipeline.try_wait_for_frames(_FRAME_WAIT_MS)
-            frame = group.get_depth_frame() if there else None
-            if not frame:
-                break
+        for frame, group in depth_groups(path):
             time = frame.get_timestamp() / 1000.0
             if time <= last:
                 continue
@@ -93,14 +63,10 @@ def _play(path: str, folder: Path) -> None:
             cv2.imwrite(str(folder / f"rgb/{stamp}.png"), picture, _QUICK_PNG)
             rgb.write(f"{stamp} rgb/{stamp}.png\n")
             dep.write(f"{stamp} depth/{stamp}.png\n")
-    if last < 0.0:
-        raise ValueError("it has no depth pictures")
 
 
 def _write_camera(folder: Path, frame: Any) -> None:
-    lens = frame.profile.as_video_stream_profile().intrinsics
-    if any(lens.coeffs):
-        raise ValueError(f"its depth is distorted ({lens.model}), not rectified")
+    lens = rectified_lens(frame)
     camera = {
         "width": lens.width,
         "height": lens.height,
