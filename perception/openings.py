@@ -1,13 +1,12 @@
 """Openings as regions with a clean outline: a rectangle where one fits."""
 
 from collections import defaultdict
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import binary_closing, binary_fill_holes, find_objects, label
 
 from perception.unseen import Reason
-from perception.values import BoolArray, FloatArray, FrozenValue, IntArray, Opening
+from perception.values import BoolArray, FloatArray, IntArray, Opening
 
 _LEAST_AREA = 0.02
 """Smaller recesses are no windows or doors, m²."""
@@ -20,22 +19,9 @@ _CLOSE = 2  # Cells: seams between frame, glass and shadow.
 _SQUARE = np.ones((3, 3), dtype=np.bool_)
 
 
-@dataclass(frozen=True, eq=False)
-class FoundOpening(FrozenValue):
-    """One opening on the grid.
-
-    Attributes:
-        outline: What is handed on.
-        inner: (ny, nx) cells whose centres lie in the outline.
-    """
-
-    outline: Opening
-    inner: BoolArray
-
-
 def find_openings(
     reason: IntArray, residual: FloatArray, *, cell: float
-) -> tuple[FoundOpening, ...]:
+) -> tuple[Opening, ...]:
     """Joins recessed and glass cells to openings and draws their outlines.
 
     Args:
@@ -56,29 +42,24 @@ def find_openings(
         region = np.zeros(reason.shape, dtype=np.bool_)
         region[window] = binary_fill_holes(parts[window] == number)
         if np.count_nonzero(region) * cell**2 >= _LEAST_AREA:
-            found.append(_opening(region, open_, reason, residual, cell))
-    return tuple(sorted(found, key=lambda opening: -opening.outline.area))
+            found.append(_opening(region, reason, residual, cell))
+    return tuple(sorted(found, key=lambda opening: -opening.area))
 
 
 def _opening(
-    region: BoolArray,
-    open_: BoolArray,
-    reason: IntArray,
-    residual: FloatArray,
-    cell: float,
-) -> FoundOpening:
-    corners, inside, fit = fit_rectangle(region, cell)
+    region: BoolArray, reason: IntArray, residual: FloatArray, cell: float
+) -> Opening:
+    corners, _, fit = fit_rectangle(region, cell)
     is_rectangle = fit >= _RECTANGLE_FIT
     depths = residual[region & (reason == Reason.RECESSED)]
     glass = np.count_nonzero(region & (reason == Reason.GLASS))
-    outline = Opening(
+    return Opening(
         kind="rectangle" if is_rectangle else "contour",
         p_TVs=corners if is_rectangle else trace_contour(region, cell),
         area=float(np.count_nonzero(region) * cell**2),
         depth=float(np.median(depths)) if depths.size else float("nan"),
         glass_share=glass / np.count_nonzero(region),
     )
-    return FoundOpening(outline, inside if is_rectangle else region & open_)
 
 
 def fit_rectangle(

@@ -118,7 +118,7 @@ def refine_segmentation(
         normals=surface.normals[middle].astype(np.float32),
         confidence=_confidence(steps, share, gap, hole, split).astype(np.float32),
         reason=reason.astype(np.uint8),
-        openings=tuple(opening.outline for opening in openings),
+        openings=openings,
     )
 
 

@@ -37,16 +37,16 @@ def test_window_with_a_pane_is_one_rectangle_and_an_arch_a_contour():
     reason[(x - 140) ** 2 + (y - 100) ** 2 < 30**2] = Reason.RECESSED
     residual = np.where(reason == Reason.RECESSED, -0.1, 0.0)
     window, round_one = find_openings(reason, residual, cell=CELL)
-    assert window.outline.kind == "rectangle"
+    assert window.kind == "rectangle"
     corners = [[0.2, 0.7, 0.7, 0.2], [0.2, 0.2, 0.8, 0.8]]
-    np.testing.assert_allclose(window.outline.p_TVs, corners, atol=1e-6)
-    assert window.outline.area == pytest.approx(0.30)
-    assert window.outline.depth == pytest.approx(-0.1)
-    assert window.outline.glass_share == pytest.approx(48 * 38 / 3000)
-    assert round_one.outline.kind == "contour"
-    x, y = round_one.outline.p_TVs
+    np.testing.assert_allclose(window.p_TVs, corners, atol=1e-6)
+    assert window.area == pytest.approx(0.30)
+    assert window.depth == pytest.approx(-0.1)
+    assert window.glass_share == pytest.approx(48 * 38 / 3000)
+    assert round_one.kind == "contour"
+    x, y = round_one.p_TVs
     area = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
-    assert area == pytest.approx(round_one.outline.area)  # Counter-clockwise: > 0.
+    assert area == pytest.approx(round_one.area)  # Counter-clockwise: > 0.
 
 
 def test_contour_of_two_squares_that_touch_at_a_corner_holds_both():
