@@ -175,7 +175,7 @@ class ArmBus:
         self._follower.fall_behind(overruns)
         if self._is_cyclic and not self._is_lost:
             self._note_measured()
-            self._count_missing()
+            self._expect_answers()
             self._counts["cycles"] += 1
             if self.before_sync is not None:
                 self.before_sync()
@@ -262,6 +262,8 @@ class ArmBus:
         for node in self.nodes:
             node.got_tpdo, node.missed, node.alarm = False, 0, None
             node.start()
+        for drive in self.drives:
+            drive.forget_owed()
         self._is_cyclic = True
         timeout = self._bus.timeouts.boot
         yield from together(
@@ -314,8 +316,8 @@ class ArmBus:
         return joints_from_axes(axes), joints_from_axes(speeds)
 
     def _note_measured(self) -> None:
-        """Passes on what came after the last SYNC, if all of it did."""
-        if self._last_cycle is not None and all(d.got_tpdo for d in self.drives):
+        """Passes on what answered the last SYNC, if all of it came."""
+        if self._last_cycle is not None and all(d.is_measured for d in self.drives):
             self.measured(self._last_cycle, *self._actual(), self.io.trigger)
 
     def _send_outputs(self) -> None:
@@ -325,15 +327,13 @@ class ArmBus:
         for drive in self.drives:
             self._send(drive.rpdo())
 
-    def _count_missing(self) -> None:
-        for drive in self.drives:
-            if drive.got_tpdo:
-                drive.missed = 0
-            elif self._counts["cycles"] > 0:
-                drive.missed += 1
-                self._counts["missing"] += 1
-            # Scripts that wait for a new one clear the flag themselves.
-            if self.phase != Phase.STARTING:
+    def _expect_answers(self) -> None:
+        came = [drive.expect_answer() for drive in self.drives]
+        if self._counts["cycles"] > 0:
+            self._counts["missing"] += came.count(False)
+        # Scripts that wait for a new one clear the flag themselves.
+        if self.phase != Phase.STARTING:
+            for drive in self.drives:
                 drive.got_tpdo = False
 
     # The watches.

@@ -21,6 +21,7 @@ from painter.canopen.od_types import pack
 from painter.canopen.units import DriveLimits
 from painter.errors import BusError
 
+_LOST_AFTER = 0.2  # A process data object that is owed for so long was lost, s.
 _STEP_SETTLE = 0.05  # Time a homing drive gets to show its old bits no longer, s.
 
 
@@ -74,6 +75,7 @@ class DriveClient(NodeClient):
         self.mode = mode
         self.config = config
         self.units = config.units()
+        self._cycle = bus.cycle
         self.state: State | None = None
         self.statusword = 0
         self.position = 0
@@ -81,8 +83,31 @@ class DriveClient(NodeClient):
         self.following_error = 0
         self.target = 0
         self.controlword = 0
+        # What SYNCs asked for and has not come, and for how many SYNCs some was owed.
+        self._owed = self._owing = 0
         self.is_homed = False
         self.is_homing = False
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether position and speed are those of the last SYNC, not of one before."""
+        return self.got_tpdo and self._owed == 0
+
+    def expect_answer(self) -> bool:
+        """Expects a TPDO1 for a SYNC; returns whether one came since the one before.
+
+        One that comes late, when the next SYNC is out, would pass for an answer to that
+        one: the arm 5 ms from where it was. What is owed for long was lost.
+        """
+        self.missed = 0 if self.got_tpdo else self.missed + 1
+        self._owing = self._owing + 1 if self._owed else 0
+        is_lost = self._owing * self._cycle > _LOST_AFTER
+        self._owed = 1 if is_lost else self._owed + 1
+        return self.got_tpdo
+
+    def forget_owed(self) -> None:
+        """Expects nothing: SYNCs begin anew."""
+        self._owed = self._owing = 0
 
     def take_process_data(self, kind: int, data: bytes) -> bool:
         """Takes TPDO1 (6041h, 6064h) and TPDO2 (606Ch, 60F4h)."""
@@ -91,6 +116,7 @@ class DriveClient(NodeClient):
             self.state = state_of(self.statusword)
             self.position = int.from_bytes(data[2:6], "little", signed=True)
             self.got_tpdo = True
+            self._owed = max(0, self._owed - 1)
         elif kind == TPDO_BASES[1] and len(data) == 8:
             self.velocity = int.from_bytes(data[:4], "little", signed=True)
             self.following_error = int.from_bytes(data[4:], "little", signed=True)

@@ -1,4 +1,5 @@
 import dataclasses
+from collections import deque
 
 import numpy as np
 import pytest
@@ -293,6 +294,62 @@ def test_a_skipped_cycle_makes_the_arm_wait_and_not_jump(lab, make_lab):
     lab.run(0.2)
     worst = max(np.abs(q - path(time)[0]).max() for time, q, _, _ in samples)
     assert worst < 1e-3
+
+
+class LateLink:
+    """What drives send is held up on its way for some cycles."""
+
+    def __init__(self, lab):
+        self._rack, self._receive = lab.rack, lab.rack.link.receive
+        self._held = deque()
+        self.delay = 0.0
+        self.lost = None
+        lab.rack.link.receive = self.receive
+
+    def receive(self, timeout):
+        now = self._rack.now
+        for frame in self._receive(timeout):
+            if frame.cob_id != self.lost:
+                self._held.append((now, frame))
+        frames = []
+        while self._held and self._held[0][0] + self.delay <= now + 1e-9:
+            frames.append(self._held.popleft()[1])
+        return frames
+
+
+@pytest.mark.parametrize("late", [1, 3])
+def test_what_comes_late_is_not_taken_for_where_the_arm_is_now(lab, late):
+    samples, link = [], LateLink(lab)
+    lab.master.measured = lambda *sample: samples.append(sample)
+    lab.sway()
+    path, start = lab.path, lab.now
+    lab.run(0.5)
+    link.delay = late * lab.bus.cycle
+    lab.step()
+    before = len(samples)
+    lab.run(0.1)
+    assert len(samples) == before
+    link.delay = 0.0
+    lab.run(0.4)
+    times = np.array([time for time, *_ in samples])
+    assert times[-1] == pytest.approx(lab.now - 2 * lab.bus.cycle, abs=1e-9)
+    assert (times > start + 0.6).sum() >= 0.4 / lab.bus.cycle - 3
+    # A cycle late it would be 0.6 rad/s x 5 ms = 3 mrad off; the loop leaves 0.14.
+    late_ones = [s for s in samples if s[0] > start + 0.1]
+    assert max(np.abs(q - path(time)[0]).max() for time, q, _, _ in late_ones) < 3e-4
+
+
+def test_a_frame_that_was_lost_is_not_waited_for_for_ever(lab):
+    samples, link = [], LateLink(lab)
+    lab.master.measured = lambda *sample: samples.append(sample)
+    link.lost = 0x180 + lab.bus.drives["base_yaw"].node_id
+    lab.step()
+    link.lost = None
+    lab.run(0.1)
+    assert not [time for time, *_ in samples if time > lab.now - 0.09]
+    lab.run(0.5)
+    assert samples[-1][0] == pytest.approx(lab.now - 2 * lab.bus.cycle, abs=1e-9)
+    assert lab.master.phase == Phase.ENABLED
 
 
 def test_switching_off_closes_the_brakes(lab):
