@@ -8,6 +8,7 @@ import pytest
 from painter import timebase
 from painter.canopen.bus_file import load_bus
 from painter.canopen.frames import SYNC_ID, Frame
+from painter.canopen.sim.node import Nmt
 from painter.canopen.sim.server import RackServer
 from painter.resources import models_path
 
@@ -25,6 +26,7 @@ def bench(tmp_path, monkeypatch):
     bench.server = RackServer(bus)
     bench.server._link.receive = bench.receive
     bench.server.rack.wire.attach(bench.hear)
+    bench.tell(milliseconds=5)
     yield bench
     bench.server.close()
 
@@ -34,6 +36,12 @@ class Bench:
         self.now = 100.0
         self.batch = []
         self.heard = []
+
+    def tell(self, milliseconds):
+        """Drives are told when SYNCs come, and made operational."""
+        for drive in self.server.rack.drives.values():
+            drive.store.fix(0x60C2, 1, milliseconds)
+            drive.nmt = Nmt.OPERATIONAL
 
     def receive(self, timeout):
         batch, self.batch = self.batch, []
@@ -64,6 +72,25 @@ def test_late_syncs_are_a_cycle_apart_for_the_drives(bench):
     assert gaps == pytest.approx([0.005] * 5, abs=1e-9)
     assert bench.server.sync_late == pytest.approx(0.0395, abs=1e-3)
     assert bench.server.slips == 0
+
+
+def test_the_cycle_is_what_the_drives_were_told_whatever_their_bus_file_says(bench):
+    bench.tell(milliseconds=40)
+    for arrival in (100.040, 100.080, 100.123, 100.160):
+        bench.until(arrival)
+        bench.batch = [SYNC]
+        bench.until(arrival + 5e-4)
+    gaps = [b - a for a, b in itertools.pairwise(bench.syncs())]
+    assert gaps == pytest.approx([0.040] * 3, abs=1e-9)
+
+
+def test_time_waits_for_no_sync_before_a_drive_is_operational(bench):
+    for drive in bench.server.rack.drives.values():
+        drive.nmt = Nmt.PRE_OPERATIONAL
+    bench.until(100.005)
+    bench.batch = [SYNC]
+    bench.until(100.040)
+    assert bench.server.rack.now == pytest.approx(0.040, abs=3e-3)
 
 
 def test_a_silent_master_does_not_stop_the_drives_time(bench):

@@ -145,7 +145,7 @@ class SimDrive(SimNode):
             return
         target = self._clamp(wanted)
         cut = self._target.take(
-            self.demand, target, now=now, period=self._period, speed=self._speed_limit
+            self.demand, target, now=now, period=self.period, speed=self._speed_limit
         )
         self._limited = cut or target != wanted
 
@@ -210,7 +210,7 @@ class SimDrive(SimNode):
         return bool(self._controlword & CONTROL_HALT)
 
     @property
-    def _period(self) -> float:
+    def period(self) -> float:
         """Object 60C2h, interpolation time period, s."""
         exponent = self.store.number(0x60C2, 2, -3)
         return float(self.store.number(0x60C2, 1, 1) * 10.0**exponent)

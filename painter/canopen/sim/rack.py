@@ -13,7 +13,7 @@ from painter.canopen.sim.drive import SimDrive
 from painter.canopen.sim.io_node import SimIo
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.motor import LoadedMotor
-from painter.canopen.sim.node import SimNode
+from painter.canopen.sim.node import Nmt, SimNode
 from painter.canopen.sim.wire import Wire
 from painter.canopen.units import AXES
 
@@ -82,6 +82,18 @@ class Rack:
     def nodes(self) -> list[SimNode]:
         """All nodes, drives first."""
         return [*self.drives.values(), self.io]
+
+    @property
+    def sync_period(self) -> float:
+        """Time between two SYNCs that the drives were told, s; 0 = none moves by it."""
+        return max(
+            (
+                drive.period
+                for drive in self.drives.values()
+                if drive.nmt == Nmt.OPERATIONAL
+            ),
+            default=0.0,
+        )
 
     def advance(self, until: float) -> None:
         """Lets frames, motors and timers run, 1 ms a step."""

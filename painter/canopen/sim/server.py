@@ -108,9 +108,10 @@ class RackServer:
     """Runs a rack in real time and carries frames between its wire and a link.
 
     Frames from the link take their time on the wire like all others, so what the rack
-    charges is what a real bus would. While SYNCs come, the rack's time is theirs: one
-    cycle from each to the next. One that is late is waited for, and then the rack's
-    clock goes on from when it was due; one that is early puts it forward.
+    charges is what a real bus would. While drives are operational and SYNCs come, the
+    rack's time is theirs: from each to the next the cycle that the drives were told.
+    One that is late is waited for, and then the rack's clock goes on from when it was
+    due; one that is early puts it forward.
 
     Attributes:
         rack: The simulated nodes.
@@ -225,7 +226,7 @@ class RackServer:
         # two cycles' way in one.
         while (end := self.rack.wire.next_end()) is not None:
             self.rack.wire.advance(end)
-        self._sync_due = when + self.rack.bus.cycle
+        self._sync_due = when + (self.rack.sync_period or math.inf)
         return when
 
     def _to_link(self, frame: Frame, now: float) -> None:
