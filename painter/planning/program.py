@@ -38,6 +38,7 @@ from painter.planning.zones import in_zones
 from perception.values import BoolArray, FloatArray, FrozenValue, WallSegmentation
 
 _TRIMS = (0.0, 0.02, 0.05, 0.10, 0.20)  # m, off a stroke's end for room to turn.
+_LEAST_LEFT = 1e-3  # m, of a trimmed stroke; shorter is rounding.
 
 # m and m/s; strokes whose flow alone differs follow one another without a gap.
 _SAME = 1e-9
@@ -315,9 +316,10 @@ def _fit(
     `roomy` there is.
     """
     trims = np.array(_TRIMS) / wanted.length
+    most = 1.0 - _LEAST_LEFT / wanted.length
     first_failure = ""
     for end in range(len(trims)):
-        if trims[end] >= 1.0:
+        if trims[end] > most:
             return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
         stroke = wanted.part(0.0, 1.0 - trims[end])
         if roomy:
@@ -330,7 +332,7 @@ def _fit(
     else:
         return _Fit(None, [], [SkippedStroke(wanted, first_failure)])
     for begin in range(len(trims)):
-        if trims[begin] + trims[end] >= 1.0:
+        if trims[begin] + trims[end] > most:
             break
         stroke = wanted.part(trims[begin], 1.0 - trims[end])
         start = _pass(stroke).start

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from painter.errors import InputError, MotionLimitError, ReachError
+from painter.errors import CollisionError, InputError, MotionLimitError, ReachError
 from painter.planning.clear_strokes import has_run_out
 from painter.planning.config import MotionConfig, RasterConfig
 from painter.planning.obstacles import ObstacleBox
-from painter.planning.program import strokes_from
+from painter.planning.program import _fit, strokes_from
 from painter.planning.spray_path import Motion, Stroke
 from painter.planning.verify import verify_motion, verify_strokes
 
@@ -268,6 +268,33 @@ def test_a_stroke_that_ends_in_a_corner_with_no_way_on_is_trimmed(robot, make_wa
     assert sum(s.stroke.length for s in dut.skipped) == pytest.approx(
         stroke.length - done.length
     )
+
+
+class NoWay:
+    """A linker with a way back from a stroke once it was asked so often; no other."""
+
+    def __init__(self, asked):
+        self.asked = asked
+
+    def to_rest(self, start):
+        self.asked -= 1
+        if self.asked:
+            raise CollisionError("no way back")
+
+    def from_rest(self, q, end):
+        raise CollisionError("no way there")
+
+
+@pytest.mark.parametrize("length", [0.03, 0.07, 0.12, 0.15, 0.25, 0.30])
+def test_a_stroke_of_which_nothing_is_left_by_trimming_is_left_out(length):
+    """Trims add up to each of these lengths, or nearly: 0.05 / 0.07 + 0.02 / 0.07 is
+    less than 1 by rounding.
+    """
+    stroke = Stroke(np.zeros(2), np.array([0.0, length]), 0.6, "cut_in", 0, 0.2)
+    for asked in range(1, 6):
+        fit = _fit(stroke, False, None, HOME, NoWay(asked))
+        assert fit.stroke is None and fit.link == []
+        assert [item.stroke for item in fit.skipped] == [stroke]
 
 
 def test_run_out_is_room_beyond_the_end_in_the_direction_of_travel(robot):
