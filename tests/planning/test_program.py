@@ -287,7 +287,7 @@ class NoWay:
 
 @pytest.mark.parametrize("length", [0.03, 0.04, 0.05, 0.07, 0.10, 0.12])
 def test_a_stroke_of_which_nothing_is_left_by_trimming_is_left_out(length):
-    """Trims add up to these lengths; as shares of one at 1.3 m to 1 but for rounding."""
+    """Trims add up to such lengths; as shares, at 1.3 m, to 1 but for rounding."""
     start, end = np.array([0.3, 1.3]), np.array([0.3, 1.3 + length])
     stroke = Stroke(start, end, 0.6, "cut_in", 0, 0.2)
     for asked in range(1, 6):
