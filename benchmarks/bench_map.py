@@ -11,6 +11,7 @@ import argparse
 import resource
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -71,7 +72,7 @@ def run_row(row: str, rate: float, scans: int = 1) -> None:
     before = peak_memory()
     cpu, online = 0.0, []
     try:
-        for frame, X_WC in scanned(config, scans):
+        for frame, X_WC in scanned(config, scans, mapper):
             truth[frame.time], arm[frame.time] = X_WC, frame.X_WC
             start = time.process_time()
             mapper.add(frame if with_arm else frame.replace(X_WC=None))
@@ -113,17 +114,30 @@ def run_row(row: str, rate: float, scans: int = 1) -> None:
 
 
 def scanned(
-    config: SequenceConfig, scans: int
+    config: SequenceConfig, scans: int, mapper: Mapper
 ) -> Iterator[tuple[Frame, RigidTransform]]:
-    """Yields the frames of several scans, one after the other."""
-    begun, last = 0.0, 0.0
+    """Yields the frames of several scans; prints after each what it came to."""
+    begun, last, done = 0.0, 0.0, 0
     for scan in range(scans):
         for frame, X_WC in render_sequence(config, SEED + scan):
             last = begun + frame.time
             yield frame.replace(time=last), X_WC
         begun = last + 1.0
         if scans > 1:
-            print(f"  after scan {scan + 1}: peak {peak_memory():.0f} MB", flush=True)
+            cpu = 1e3 * np.array(mapper.seconds[done:])
+            done = len(mapper.seconds)
+            print(
+                f"  scan {scan + 1}: {cpu.size} keyframes, {cpu.mean():.0f} ms mean, "
+                f"{np.percentile(cpu, 95):.0f} ms p95, {cpu.max():.0f} ms at most; "
+                f"memory {memory():.0f} MB, peak {peak_memory():.0f} MB",
+                flush=True,
+            )
+
+
+def memory() -> float:
+    """Returns what the process has in memory now, MB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
 
 
 def peak_memory() -> float:

@@ -98,6 +98,7 @@ class MapperConfig(PoseGraphConfig):
         keyframe_distance: As in `PoseGraphConfig`; nearer, so that a camera without
             poses is followed.
         max_links: As in `PoseGraphConfig`.
+        working_set: Keyframes in memory and solved for while frames come, at most.
     """
 
     keyframe_distance: float = 0.10
@@ -105,3 +106,4 @@ class MapperConfig(PoseGraphConfig):
     cell: float = 0.005
     layer: float = 0.015
     stride: int = 3
+    working_set: int = 60

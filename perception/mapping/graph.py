@@ -21,7 +21,7 @@ from perception.mapping.links import Link
 from perception.mapping.normal_equations import NormalEquations
 from perception.mapping.observability import information_of
 from perception.mapping.poses import Poses, skew
-from perception.values import BoolArray, FloatArray
+from perception.values import BoolArray, FloatArray, IntArray
 
 _SCHEDULE = (1e5, 1e4, 1e3, 100.0, 30.0, 30.0, 30.0)
 """Squared sigmas at which a link's weight has fallen to a quarter, round by round."""
@@ -44,6 +44,24 @@ class Sighting:
     sight: PlaneSight
 
 
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """What is held while only some keyframes are solved for.
+
+    Attributes:
+        keyframes: (n,) bool, those that are held, with the base's steps at them.
+        planes: (m,) bool, those that are held.
+        mount: (6,) step from the arm's camera frame to the true one, held as well.
+        base: (n) steps of the base in W, about its origin: where they are held, or else
+            thought to be.
+    """
+
+    keyframes: BoolArray
+    planes: BoolArray
+    mount: FloatArray
+    base: Poses
+
+
 @dataclass(eq=False)
 class Problem:
     """What is known of the keyframes.
@@ -55,6 +73,8 @@ class Problem:
         links: Between keyframes.
         sightings: Of planes.
         planes: (m, 4): unit normal in W and offset, n . p = d.
+        numbers: (n,) ascending, by which links and sightings call the keyframes.
+        settled: What is held; None = nothing but the base's step at the first keyframe.
     """
 
     X_WC: Poses
@@ -63,6 +83,8 @@ class Problem:
     links: list[Link]
     sightings: list[Sighting]
     planes: FloatArray
+    numbers: IntArray
+    settled: Settled | None = None
 
 
 @dataclass(eq=False)
@@ -77,6 +99,7 @@ class Estimate:
         mount_observed: (6, 6) projection on its observed directions, in units of its
             prior; along the others it is held at zero.
         base: (n) steps of the base in W at every keyframe, about the scan's middle.
+        middle: (3,) m, in W, that middle.
         link_weights: (links,) 0 = dropped, 1 = taken in full.
         sight_weights: (sightings,) the same.
         observed: (n, 6, 6) what links and planes tell of each keyframe.
@@ -88,6 +111,7 @@ class Estimate:
     mount_covariance: FloatArray
     mount_observed: FloatArray
     base: Poses
+    middle: FloatArray
     link_weights: FloatArray
     sight_weights: FloatArray
     observed: FloatArray = field(repr=False)
@@ -106,20 +130,35 @@ class Graph:
         self._problem, self._config = problem, config
         self._n, self._m = len(problem.X_WC), len(problem.planes)
         links, sights = problem.links, problem.sightings
-        self._i = np.array([link.i for link in links], dtype=np.int64)
-        self._j = np.array([link.j for link in links], dtype=np.int64)
+        numbers = problem.numbers
+        self._i = np.searchsorted(numbers, [link.i for link in links])
+        self._j = np.searchsorted(numbers, [link.j for link in links])
         self._Z = Poses.of([link.X_ij for link in links])
         self._omega = np.array([link.information for link in links]).reshape(-1, 6, 6)
-        self._k = np.array([s.k for s in sights], dtype=np.int64)
+        self._k = np.searchsorted(numbers, [s.k for s in sights])
         self._l = np.array([s.plane for s in sights], dtype=np.int64)
         self._center = np.array([s.sight.center for s in sights]).reshape(-1, 3)
         self._axes = np.array([s.sight.axes for s in sights]).reshape(-1, 3, 2)
         sigma = [[s.sight.sigma, *s.sight.tilt_sigma] for s in sights]
         self._plane_omega = np.array(sigma).reshape(-1, 3) ** -2.0
-        self._arm = np.flatnonzero(problem.has_arm)
-        middle = problem.X_WC.p.mean(axis=0) if self._n else np.zeros(3)
-        self._middle = middle
+        self._middle = problem.X_WC.p.mean(axis=0) if self._n else np.zeros(3)
         self._mount_prior = information_of(config.mount_sigma, config.mount_sigma_deg)
+        self._mount, self._base = Poses.identity(1), Poses.identity(self._n)
+        held = np.zeros(self._n, dtype=np.bool_)
+        self._free = np.ones(12 * self._n + 6 + 3 * self._m, dtype=np.bool_)
+        if settled := problem.settled:
+            held = settled.keyframes
+            self._mount = self._mount.moved(settled.mount[None])
+            self._base = settled.base.about(self._middle)
+            free = ~np.concatenate([held, held, [True]])
+            self._free = np.concatenate(
+                [np.repeat(free, 6), np.repeat(~settled.planes, 3)]
+            )
+        self._arm = np.flatnonzero(problem.has_arm & ~held)
+        # The base's steps count from the first keyframe on; without an arm, all does.
+        self._free[6 * self._n : 6 * self._n + 6] = False
+        if not len(self._arm):
+            self._free[:6] = False
 
     def optimize(self, quick: bool = False) -> Estimate:
         """Finds the most likely poses, with the mount's error where it is observed.
@@ -150,8 +189,7 @@ class Graph:
     def _optimize(self, mount_prior: FloatArray, schedule: Sequence[float]) -> Estimate:
         problem, n, m = self._problem, self._n, self._m
         X, planes = problem.X_WC, problem.planes.copy()
-        mount = Poses.identity(1)
-        base = Poses.identity(n)
+        mount, base = self._mount, self._base
         link_weights = np.ones(len(problem.links))
         sight_weights = np.ones(len(problem.sightings))
         for scale in schedule:
@@ -159,7 +197,7 @@ class Graph:
             link_weights = self._add_links(system, X, scale)
             sight_weights = self._add_planes(system, X, planes, scale)
             self._add_arm(system, X, mount, base, mount_prior, scale > _LOOSE)
-            step, mount_covariance = system.solve(12 * n)
+            step, mount_covariance = system.solve(self._free, 12 * n)
             X = X.moved(step[: 6 * n].reshape(n, 6))
             base = base.moved(step[6 * n : 12 * n].reshape(n, 6))
             mount = mount.moved(step[12 * n : 12 * n + 6].reshape(1, 6))
@@ -173,6 +211,7 @@ class Graph:
             mount_covariance=mount_covariance,
             mount_observed=np.zeros((6, 6)),
             base=base,
+            middle=self._middle,
             link_weights=np.where(link_weights < 0.05, 0.0, link_weights),
             sight_weights=np.where(sight_weights < 0.05, 0.0, sight_weights),
             observed=self._observed(X, planes, link_weights, sight_weights),
@@ -251,12 +290,9 @@ class Graph:
         mount_prior: FloatArray,
         loose: bool,
     ) -> None:
-        """Adds priors of arm, mount and base; without an arm, a fixed first pose."""
+        """Adds priors of arm, mount and base."""
         config, n, k = self._config, self._n, self._arm
         if not len(k):
-            e = self._problem.X_WC[:1].steps_to(X[:1])
-            W = np.diag([1e10] * 6)[None]
-            system.add([(np.zeros(1, np.int64), np.eye(6)[None])], e, W)
             return
         # Where the arm says it is, after mount and base are put right.
         inner = self._problem.X_arm[k] @ mount[np.zeros(len(k), np.int64)]
@@ -277,11 +313,6 @@ class Graph:
         system.add([(6 * k, ones), (6 * n + 6 * k, J_base), (middle, -ones)], e, W)
         e = Poses.identity(1).steps_to(mount)
         system.add([(np.array([12 * n]), np.eye(6)[None])], e, mount_prior[None])
-        first = (
-            np.eye(6)[None] * 1e10
-        )  # The base's shift counts from the first pose on.
-        e = Poses.identity(1).steps_to(base[:1])
-        system.add([(np.array([6 * n]), np.eye(6)[None])], e, first)
         if n > 1:
             self._add_walk(system, base, loose)
 

@@ -1,8 +1,7 @@
 """What is taken from one frame: a grid of oriented points, planes and features."""
 
-import zlib
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -12,7 +11,8 @@ from pydrake.math import RigidTransform
 from perception.config import MapConfig
 from perception.depth import CameraIntrinsics, usable_pixels
 from perception.mapping.config import MapperConfig, PoseGraphConfig
-from perception.mapping.frames import ColorImage, DepthImage, Frame
+from perception.mapping.frames import DepthImage, Frame
+from perception.mapping.view import Features, ThinPicture, View
 from perception.planes import fit_plane, ransac_plane
 from perception.values import BoolArray, FloatArray, FrozenValue
 
@@ -49,96 +49,6 @@ class PlaneSight(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False)
-class Features(FrozenValue):
-    """Corners with depth.
-
-    Attributes:
-        uv: (n, 2) px, column and row.
-        p_Cs: (n, 3) m, in C.
-        descriptors: (n, 32) uint8, ORB's.
-    """
-
-    uv: FloatArray
-    p_Cs: FloatArray
-    descriptors: npt.NDArray[np.uint8]
-
-    @classmethod
-    def none(cls) -> Self:
-        """Makes an empty set."""
-        return cls(np.zeros((0, 2)), np.zeros((0, 3)), np.zeros((0, 32), np.uint8))
-
-
-@dataclass(frozen=True, eq=False)
-class ThinPicture(FrozenValue):
-    """Every `stride`-th pixel and row of a picture, compressed.
-
-    Attributes:
-        stride: Of the pixels kept.
-        shape: (h, w) of what is kept.
-        depth: Usable depth, uint16, mm, 0 = none; zlib.
-        color: Its colours, JPEG; None = not kept.
-    """
-
-    stride: int
-    shape: tuple[int, int]
-    depth: bytes
-    color: bytes | None = None
-
-    @classmethod
-    def of(
-        cls,
-        depth_mm: DepthImage,
-        usable: BoolArray,
-        stride: int,
-        color: ColorImage | None = None,
-    ) -> Self:
-        """Packs a picture.
-
-        Args:
-            depth_mm: (H, W) uint16, mm.
-            usable: (H, W) bool, the pixels whose depth is kept.
-            stride: Every so many-th pixel and row is kept.
-            color: (H, W, 3) uint8, RGB, if that is wanted, too.
-        """
-        thin = np.s_[::stride, ::stride]
-        kept = np.where(usable[thin], depth_mm[thin], np.uint16(0))
-        jpeg = None
-        if color is not None:
-            _, data = cv2.imencode(".jpg", color[thin][:, :, ::-1])
-            jpeg = data.tobytes()
-        shape = (kept.shape[0], kept.shape[1])
-        return cls(stride, shape, zlib.compress(kept.tobytes(), 1), jpeg)
-
-    def camera(self, intrinsics: CameraIntrinsics) -> CameraIntrinsics:
-        """Returns the camera that would have taken the thinned picture.
-
-        Args:
-            intrinsics: Of the one that took the full picture.
-        """
-        return CameraIntrinsics(
-            fx=intrinsics.fx / self.stride,
-            fy=intrinsics.fy / self.stride,
-            cx=intrinsics.cx / self.stride,
-            cy=intrinsics.cy / self.stride,
-            width=self.shape[1],
-            height=self.shape[0],
-        )
-
-    @property
-    def depth_mm(self) -> DepthImage:
-        """Unpacks (h, w) uint16, mm, 0 = none."""
-        return np.frombuffer(zlib.decompress(self.depth), np.uint16).reshape(self.shape)
-
-    @property
-    def colors(self) -> ColorImage:
-        """Unpacks (h, w, 3) uint8, RGB; black where no colours were kept."""
-        if self.color is None:
-            return np.zeros((*self.shape, 3), np.uint8)
-        image = cv2.imdecode(np.frombuffer(self.color, np.uint8), cv2.IMREAD_COLOR)
-        return np.asarray(image)[:, :, ::-1].astype(np.uint8)
-
-
-@dataclass(frozen=True, eq=False)
 class PointGrid(FrozenValue):
     """Mean points of blocks of pixels.
 
@@ -153,6 +63,13 @@ class PointGrid(FrozenValue):
     valid: BoolArray
 
 
+class ViewSource(Protocol):
+    """Has a view in memory, or knows where it is."""
+
+    def view(self) -> View:
+        """Returns the view."""
+
+
 @dataclass(frozen=True, eq=False)
 class Keyframe(FrozenValue):
     """What is kept of a frame; full pictures are not.
@@ -161,19 +78,30 @@ class Keyframe(FrozenValue):
         number: Of the frame, counted from 0.
         time: s.
         X_arm: Pose that the arm gave; None = unknown.
-        z: (h, w) float32, m, mean depth of blocks of pixels, 0 = none; see `grid_of`.
         planes: Largest first.
-        features: Corners.
-        picture: Pixels for the fusion; None where others keep them.
+        source: Of all that takes memory.
     """
 
     number: int
     time: float
     X_arm: RigidTransform | None
-    z: npt.NDArray[np.float32]
     planes: tuple[PlaneSight, ...]
-    features: Features
-    picture: ThinPicture | None = None
+    source: ViewSource
+
+    @property
+    def z(self) -> npt.NDArray[np.float32]:
+        """(h, w) m, mean depth of blocks of pixels, 0 = none; see `grid_of`."""
+        return self.source.view().z
+
+    @property
+    def features(self) -> Features:
+        """Its corners."""
+        return self.source.view().features
+
+    @property
+    def picture(self) -> ThinPicture | None:
+        """Pixels for the fusion; None where others keep them."""
+        return self.source.view().picture
 
     def grid(self, intrinsics: CameraIntrinsics) -> PointGrid:
         """Returns its mean points with their normals."""
@@ -181,9 +109,10 @@ class Keyframe(FrozenValue):
 
     def points(self, intrinsics: CameraIntrinsics, step: int) -> FloatArray:
         """Returns every `step`-th of its mean points, (3, n), m, in C."""
-        row, column = np.nonzero(self.z)
+        z = self.z
+        row, column = np.nonzero(z)
         row, column = row[::step], column[::step]
-        return _on_rays(row, column, self.z[row, column].astype(float), intrinsics)
+        return _on_rays(row, column, z[row, column].astype(float), intrinsics)
 
 
 def make_keyframe(
@@ -204,14 +133,13 @@ def make_keyframe(
     """
     usable = usable_pixels(frame.depth_mm, MapConfig(max_range=config.max_range))
     z = mean_depth(frame.depth_mm, usable)
+    picture = ThinPicture.of(frame.depth_mm, usable, config.stride, frame.color)
     return Keyframe(
         number=number,
         time=frame.time,
         X_arm=frame.X_WC,
-        z=z,
         planes=tuple(see_planes(grid_of(z, intrinsics), config, number)),
-        features=features,
-        picture=ThinPicture.of(frame.depth_mm, usable, config.stride, frame.color),
+        source=View(z, features, picture),
     )
 
 

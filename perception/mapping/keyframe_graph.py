@@ -1,7 +1,9 @@
 """Keyframes with their links and planes: a value that grows, and is solved at need."""
 
+import bisect
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -9,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from perception.depth import CameraIntrinsics
 from perception.mapping.config import PoseGraphConfig
-from perception.mapping.graph import Estimate, Graph, Problem, Sighting
+from perception.mapping.graph import Estimate, Graph, Problem, Settled, Sighting
 from perception.mapping.keyframe import Keyframe, PlaneSight
 from perception.mapping.links import (
     Link,
@@ -19,8 +21,10 @@ from perception.mapping.links import (
 )
 from perception.mapping.observability import observed_directions, prior_sigmas
 from perception.mapping.poses import Poses
-from perception.values import FloatArray, FrozenValue
+from perception.values import FloatArray, FrozenValue, IntArray
 from perception.wall import upright_rotation
+
+_Part = TypeVar("_Part")
 
 _PLANE_ANGLE_DEG = 5.0
 _PLANE_DISTANCE = 0.03
@@ -43,9 +47,12 @@ class KeyframeGraph(FrozenValue):
         config: Sigmas and thresholds; never changed.
         keyframes: In order of time.
         poses: X_WC of each.
-        links: Between them.
+        links: Between them, by the newer keyframe.
         sightings: Of planes, by keyframe.
         planes: (m, 4): unit normal in W and offset, n . p = d.
+        sighted: (m,) sightings of each.
+        mount: (6,) step from the arm's camera frame to the true one, so far.
+        base: (n) steps of the base in W at every keyframe, about its origin, so far.
     """
 
     intrinsics: CameraIntrinsics
@@ -55,6 +62,9 @@ class KeyframeGraph(FrozenValue):
     links: tuple[Link, ...]
     sightings: tuple[Sighting, ...]
     planes: FloatArray
+    sighted: IntArray
+    mount: FloatArray
+    base: Poses
 
     @classmethod
     def empty(cls, intrinsics: CameraIntrinsics, config: PoseGraphConfig) -> Self:
@@ -68,7 +78,18 @@ class KeyframeGraph(FrozenValue):
             ValueError: A setting is out of bounds.
         """
         config.validate()
-        return cls(intrinsics, config, (), (), (), (), np.zeros((0, 4)))
+        return cls(
+            intrinsics=intrinsics,
+            config=config,
+            keyframes=(),
+            poses=(),
+            links=(),
+            sightings=(),
+            planes=np.zeros((0, 4)),
+            sighted=np.zeros(0, np.int64),
+            mount=np.zeros(6),
+            base=Poses.identity(0),
+        )
 
     @property
     def has_arm(self) -> bool:
@@ -109,8 +130,11 @@ class KeyframeGraph(FrozenValue):
             links: To older ones, if they are known already; else they are looked for.
         """
         index = len(self.keyframes)
+        base = self.base[-1:] if index else Poses.identity(1)
         grown = self.replace(
-            keyframes=(*self.keyframes, keyframe), poses=(*self.poses, X_WC)
+            keyframes=(*self.keyframes, keyframe),
+            poses=(*self.poses, X_WC),
+            base=self.base.followed_by(base),
         )
         if links is None:
             links = grown._find_links(index)
@@ -118,32 +142,83 @@ class KeyframeGraph(FrozenValue):
         for sight in keyframe.planes:
             number = _associate(sight, X_WC, planes)
             sightings.append(Sighting(index, number, sight))
+        sighted = np.bincount(
+            [s.plane for s in sightings[len(self.sightings) :]], minlength=len(planes)
+        )
+        sighted[: len(self.sighted)] += self.sighted
         return grown.replace(
             links=(*self.links, *links),
             sightings=tuple(sightings),
             planes=np.array(planes).reshape(-1, 4),
+            sighted=sighted,
         )
 
-    def optimized(self, quick: bool = False) -> tuple[Self, Estimate]:
-        """Returns the graph with poses and planes at their most likely, and more.
+    def optimized(self) -> tuple[Self, Estimate]:
+        """Returns the graph with all that it holds at its most likely, and more."""
+        problem = self._problem(range(len(self.keyframes)))
+        estimate = Graph(problem, self.config).optimize()
+        return self._moved(problem, estimate), estimate
+
+    def settled(self, members: Sequence[int]) -> Self:
+        """Returns the graph with some keyframes at their most likely, by fewer rounds.
+
+        All others are held where they are, and with them the mount and the planes that
+        they saw, too. What this costs depends on the number of members alone.
 
         Args:
-            quick: Fewer rounds, for between keyframes.
+            members: Numbers of the keyframes to be moved, ascending.
         """
-        unknown = RigidTransform()
-        problem = Problem(
-            X_WC=Poses.of(list(self.poses)),
-            X_arm=Poses.of([k.X_arm or unknown for k in self.keyframes]),
-            has_arm=np.array([k.X_arm is not None for k in self.keyframes]),
-            links=list(self.links),
-            sightings=list(self.sightings),
+        problem = self._problem(members)
+        return self._moved(problem, Graph(problem, self.config).optimize(quick=True))
+
+    def _problem(self, members: Sequence[int]) -> Problem:
+        """Returns the members with the older keyframes that links tie them to."""
+        links = [
+            link
+            for k in members
+            for link in _of_number(self.links, k, lambda link: link.j)
+        ]
+        sightings = [
+            sighting
+            for k in members
+            for sighting in _of_number(self.sightings, k, lambda sighting: sighting.k)
+        ]
+        ends = [*members, *(link.i for link in links)]
+        numbers = np.unique(np.array(ends, dtype=np.int64))
+        settled = None
+        if len(members) < len(self.keyframes):
+            planes = [sighting.plane for sighting in sightings]
+            settled = Settled(
+                keyframes=~np.isin(numbers, members),
+                planes=self.sighted > np.bincount(planes, minlength=len(self.planes)),
+                mount=self.mount,
+                base=self.base[numbers],
+            )
+        keyframes = [self.keyframes[k] for k in numbers]
+        return Problem(
+            X_WC=Poses.of([self.poses[k] for k in numbers]),
+            X_arm=Poses.of([k.X_arm or RigidTransform() for k in keyframes]),
+            has_arm=np.array([k.X_arm is not None for k in keyframes]),
+            links=links,
+            sightings=sightings,
             planes=self.planes,
+            numbers=numbers,
+            settled=settled,
         )
-        estimate = Graph(problem, self.config).optimize(quick)
-        moved = self.replace(
-            poses=tuple(estimate.X_WC.list()), planes=estimate.planes.copy()
+
+    def _moved(self, problem: Problem, estimate: Estimate) -> Self:
+        """Returns the graph with a problem's keyframes where they are now."""
+        poses = list(self.poses)
+        for k, X_WC in zip(problem.numbers, estimate.X_WC.list(), strict=True):
+            poses[k] = X_WC
+        return self.replace(
+            poses=tuple(poses),
+            planes=estimate.planes.copy(),
+            mount=estimate.mount.copy(),
+            base=self.base.with_rows(
+                problem.numbers, estimate.base.about(-estimate.middle)
+            ),
         )
-        return moved, estimate
 
     def solved(self) -> "Solution":
         """Returns the last answer: the arm corrected where that is observed."""
@@ -204,10 +279,8 @@ class KeyframeGraph(FrozenValue):
         if not self.config.max_links:
             return []
         recent = list(range(max(0, index - _RECENT), index))
-        places = Poses.of(list(self.poses))
-        away = np.linalg.norm(
-            places.p[: max(0, index - _RECENT)] - places.p[index], axis=1
-        )
+        places = np.array([X.translation() for X in self.poses])
+        away = np.linalg.norm(places[: max(0, index - _RECENT)] - places[index], axis=1)
         older = [
             (self._overlap(self.keyframes[k], self._relative(index, k)), k)
             for k in np.argsort(away)[:_CANDIDATES].tolist()
@@ -274,6 +347,14 @@ def angle_deg(R: RotationMatrix) -> float:
     """Returns the angle of a rotation, deg."""
     cos = (np.trace(R.matrix()) - 1.0) / 2.0
     return float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0))))
+
+
+def _of_number(
+    parts: Sequence[_Part], k: int, number: Callable[[_Part], int]
+) -> Sequence[_Part]:
+    """Returns those of some parts, sorted by number, that have a number."""
+    start = bisect.bisect_left(parts, k, key=number)
+    return parts[start : bisect.bisect_right(parts, k, start, key=number)]
 
 
 def _associate(

@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from perception.depth import CameraIntrinsics
 from perception.mapping.config import PoseGraphConfig
-from perception.mapping.keyframe import BLOCK, Features, PointGrid
+from perception.mapping.keyframe import BLOCK, PointGrid
 from perception.mapping.poses import skew
+from perception.mapping.view import Features
 from perception.values import FloatArray, FrozenValue
 
 _LEVER = 0.4

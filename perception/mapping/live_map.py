@@ -11,15 +11,9 @@ from perception.config import MapConfig
 from perception.depth import CameraIntrinsics, backproject, usable_pixels
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.frames import DepthImage
-from perception.mapping.keyframe import (
-    Features,
-    Keyframe,
-    ThinPicture,
-    grid_of,
-    mean_depth,
-    see_planes,
-)
+from perception.mapping.keyframe import Keyframe, grid_of, mean_depth, see_planes
 from perception.mapping.keyframe_graph import KeyframeGraph, Solution
+from perception.mapping.view import ThinPicture, View
 from perception.values import BoolArray, FrozenValue, SurfaceMap
 from perception.voxel_map import VoxelMap
 
@@ -174,7 +168,7 @@ class LiveMap(FrozenValue):
         number = len(graph.keyframes)
         z = mean_depth(depth_mm, usable)
         planes = see_planes(grid_of(z, graph.intrinsics), graph.config, number)
-        keyframe = Keyframe(number, time, X_arm, z, tuple(planes), Features.none())
+        keyframe = Keyframe(number, time, X_arm, tuple(planes), View(z))
         return graph.extended(keyframe, X_arm @ self.X_CCm)
 
     def _fused_again(self) -> VoxelMap:

@@ -13,14 +13,11 @@ from perception.errors import PerceptionError
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import Frame
 from perception.mapping.fusion import FusedMap, fuse
-from perception.mapping.keyframe import (
-    Features,
-    Keyframe,
-    find_features,
-    make_keyframe,
-)
+from perception.mapping.keyframe import Keyframe, find_features, make_keyframe
 from perception.mapping.keyframe_graph import KeyframeGraph, Solution
 from perception.mapping.links import Link, LinkKind, link_by_appearance
+from perception.mapping.view import Features
+from perception.mapping.working_set import WorkingSet
 
 _PATIENCE = 10
 """Frames that may be lost before a map without poses is given up."""
@@ -65,6 +62,18 @@ class MappingResult:
 class Mapper:
     """Maps a sequence; `add` the frames, then `finish`.
 
+    While frames come, time and memory are bounded by `MapperConfig.working_set` (w):
+
+    - at most w keyframes have corners, depths and pixels in memory, those that were
+      made or overlapped last; the others wait in a file and come back at need;
+    - every `optimize_every` keyframes these w are solved for, with at most w times
+      `max_links` links; all else is held where it is (see `KeyframeGraph.settled`).
+
+    What grows is small: poses, planes and links stay, some 6 kB a keyframe, and so does
+    a pose of each frame; finding the nearest keyframes takes 1 us for each there is.
+    Only `finish` solves for all keyframes, and fuses them one after the other: it is
+    for the end, or for later from the session's file.
+
     Attributes:
         config: Settings; not to be changed.
         graph: Keyframes so far, with links and planes.
@@ -91,6 +100,7 @@ class Mapper:
         self.placed: list[tuple[float, int, RigidTransform]] = []
         self.fuse_seconds = 0.0
         self._intrinsics = intrinsics
+        self._working_set = WorkingSet(config.working_set)
         self._last_time = -np.inf
         self._best_inliers = 0
 
@@ -185,9 +195,10 @@ class Mapper:
         index = len(self.graph.keyframes)
         self.placed.append((keyframe.time, index, RigidTransform()))
         self._last_time = max(self._last_time, keyframe.time)
+        keyframe = self._working_set.take(index, keyframe)
         self.graph = self.graph.extended(keyframe, X_WC, links)
         if index and index % self.config.optimize_every == 0:
-            self.graph, _ = self.graph.optimized(quick=True)
+            self.graph = self.graph.settled(self._working_set.members)
 
     def _track(self, features: Features) -> Link | None:
         """Finds a frame by appearance among the last keyframes."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from perception.values import FloatArray, IntArray
+from perception.values import BoolArray, FloatArray, IntArray
 
 _WEAK = 1e-3
 """Prior on what nothing else holds, in inverse squared metres or radians."""
@@ -58,25 +58,30 @@ class NormalEquations:
                     np.broadcast_to(index2[:, None, :], block.shape).ravel()
                 )
 
-    def solve(self, block: int) -> tuple[FloatArray, FloatArray]:
+    def solve(self, free: BoolArray, block: int) -> tuple[FloatArray, FloatArray]:
         """Returns the step that makes the slope vanish.
 
         Args:
-            block: First of the six unknowns whose (6, 6) covariance is returned too.
+            free: (size,) the unknowns that move; the others' steps are zero.
+            block: First of the six unknowns whose (6, 6) covariance is returned too;
+                zero where they do not move.
         """
-        everywhere = np.arange(self.size)
+        count = np.count_nonzero(free)
+        place = np.cumsum(free) - 1
+        everywhere = np.flatnonzero(free)
+        rows = np.concatenate([*self.rows, everywhere])
+        columns = np.concatenate([*self.columns, everywhere])
+        values = np.concatenate([*self.values, np.full(count, _WEAK)])
+        kept = free[rows] & free[columns]
         matrix = sparse.csc_matrix(
-            (
-                np.concatenate([*self.values, np.full(self.size, _WEAK)]),
-                (
-                    np.concatenate([*self.rows, everywhere]),
-                    np.concatenate([*self.columns, everywhere]),
-                ),
-            ),
-            shape=(self.size, self.size),
+            (values[kept], (place[rows[kept]], place[columns[kept]])),
+            shape=(count, count),
         )
         factors = splu(matrix, permc_spec="MMD_AT_PLUS_A")
         units = np.zeros((self.size, 6))
         units[block : block + 6] = np.eye(6)
-        covariance = factors.solve(units)[block : block + 6]
-        return -factors.solve(self.slope), np.asarray(covariance)
+        units[free] = factors.solve(units[free])
+        units[~free] = 0.0
+        step = np.zeros(self.size)
+        step[free] = -factors.solve(self.slope[free])
+        return step, units[block : block + 6]

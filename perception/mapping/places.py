@@ -9,9 +9,10 @@ from pydrake.math import RigidTransform
 from scipy import sparse
 
 from perception.errors import PerceptionError
-from perception.mapping.keyframe import Features, Keyframe
+from perception.mapping.keyframe import Keyframe
 from perception.mapping.keyframe_graph import KeyframeGraph, angle_deg
 from perception.mapping.links import link_by_appearance
+from perception.mapping.view import Features
 
 _TABLES = 12
 _BITS = 11

@@ -70,6 +70,26 @@ class Poses:
         R = self.R @ Rotation.from_rotvec(steps[:, :3].copy()).as_matrix()
         return Poses(R, self.p + np.einsum("nij,nj->ni", self.R, steps[:, 3:]))
 
+    def followed_by(self, other: "Poses") -> "Poses":
+        """Returns these poses and then others."""
+        return Poses(
+            np.concatenate([self.R, other.R]), np.concatenate([self.p, other.p])
+        )
+
+    def with_rows(self, index: IntArray, other: "Poses") -> "Poses":
+        """Returns the poses with those at `index` exchanged for others."""
+        R, p = self.R.copy(), self.p.copy()
+        R[index], p[index] = other.R, other.p
+        return Poses(R, p)
+
+    def about(self, p_AM: FloatArray) -> "Poses":
+        """Returns the same motions of A, turning about a point M instead of A's origin.
+
+        Args:
+            p_AM: (3,) m.
+        """
+        return Poses(self.R, self.p + self.R @ p_AM - p_AM)
+
     def steps_to(self, other: "Poses") -> FloatArray:
         """Returns the (n, 6) steps from these poses to others."""
         difference = self.inverse() @ other

@@ -6,7 +6,8 @@ from pydrake.math import RigidTransform
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import Frame
 from perception.mapping.fusion import fuse, write_map, write_mesh, write_voxels
-from perception.mapping.keyframe import Features, make_keyframe
+from perception.mapping.keyframe import make_keyframe
+from perception.mapping.view import Features
 
 # Nine pixels a voxel at 0.7 m: the test's camera has a pixel every 3.1 mm.
 CONFIG = MapperConfig(stride=2, cell=0.02)

@@ -3,7 +3,7 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.mapping.config import MapperConfig
-from perception.mapping.graph import Graph, Problem, Sighting
+from perception.mapping.graph import Graph, Problem, Settled, Sighting
 from perception.mapping.keyframe import PlaneSight
 from perception.mapping.links import Link, LinkKind
 from perception.mapping.observability import observed_directions
@@ -48,6 +48,7 @@ def problem_of(start, arm, links, sightings=(), planes=()):
         links=list(links),
         sightings=list(sightings),
         planes=np.array(planes, dtype=float).reshape(-1, 4),
+        numbers=np.arange(COUNT),
     )
 
 
@@ -132,3 +133,33 @@ def test_a_plane_corrects_distance_and_tilt_alone():
     np.testing.assert_allclose(in_world, np.diag([0, 0, 1]), atol=0.02)
     in_world = R_WC @ projection[:3, :3] @ R_WC.T
     np.testing.assert_allclose(in_world, np.diag([1, 1, 0]), atol=0.02)
+
+
+def test_what_is_settled_is_held_and_the_rest_moves_to_the_truth():
+    truth = true_poses()
+    normal, offset = np.array([0.0, 0.0, -1.0]), -0.7
+    X_shift = Poses.of([RigidTransform(RollPitchYaw(0.0, 0.0, 0.01), [0.003, 0, 0])])
+    X_mount = RigidTransform(RollPitchYaw(0.002, -0.003, 0.0), [0.0, 0.0, 0.0])
+    shifts = Poses.identity(COUNT).with_rows(
+        np.arange(3, COUNT), X_shift[np.zeros(COUNT - 3, np.int64)]
+    )
+    mounts = Poses.of([X_mount] * COUNT)
+    arm = (shifts.inverse() @ Poses.of(truth) @ mounts.inverse()).list()
+    # The first third is settled, with the step of the base at the fourth keyframe; of
+    # the others nothing is known but arm and plane.
+    held = np.arange(COUNT) < COUNT // 3
+    rng = np.random.default_rng(4)
+    moved = Poses.of(truth).moved(0.002 * rng.standard_normal((COUNT, 6))).list()
+    start = [X if fixed else Y for X, Y, fixed in zip(truth, moved, held, strict=True)]
+    sightings = [
+        Sighting(k, 0, sight_of(X, normal, offset)) for k, X in enumerate(truth)
+    ]
+    problem = problem_of(start, arm, [], sightings, [[*normal, offset]])
+    mount = Poses.identity(1).steps_to(mounts[:1])[0]
+    problem.settled = Settled(held, np.array([True]), mount, shifts)
+    estimate = Graph(problem, CONFIG).optimize(quick=True)
+    np.testing.assert_array_equal(estimate.X_WC.p[held], problem.X_WC.p[held])
+    np.testing.assert_array_equal(estimate.planes, problem.planes)
+    np.testing.assert_allclose(estimate.mount, mount, atol=1e-12)
+    # Mount and base are known up to there: that puts right all that the arm says.
+    assert distances(estimate.X_WC, truth).max() < 1e-6
