@@ -30,7 +30,7 @@ STAGES: dict[str, tuple[Any, str]] = {
     "fit": (raster.FilmFit, "fit"),
     "cut back": (program, "clear_strokes"),
     "order": (program, "order_strokes"),
-    "links": (program, "_link"),
+    "links": (program, "_linked"),
     "verify": (program, "verify_motion"),
     "verify strokes": (program, "verify_strokes"),
 }

@@ -258,43 +258,51 @@ def _coats(
 
 
 def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> _Links:
-    """Joins strokes by moves, from rest at `q0` to rest at home."""
-    try:
-        links = _link(strokes, has_run_out(strokes, linker), q0, linker)
-        if not links[-1]:
-            return links
-    except (CollisionError, ReachError):
-        pass
-    # Something is in the way: now the way back is looked for after every stroke.
-    return _link(strokes, np.zeros(len(strokes), dtype=bool), q0, linker)
+    """Joins strokes by moves, from rest at `q0` to rest at home.
 
-
-def _link(
-    strokes: Sequence[Stroke], run_out: BoolArray, q0: FloatArray, linker: Linker
-) -> _Links:
-    """Does so; where `run_out` (n,) is True, there is known to be a way back."""
+    Beyond a stroke with run-out there is believed to be a way back. Where it turns out
+    that from there one cannot go on, the stroke is joined once more, its way back
+    looked for.
+    """
+    believed = has_run_out(strokes, linker)
+    fits: list[_Fit] = []
+    home: list[Segment] = []
+    while not home:
+        done = [number for number, fit in enumerate(fits) if fit.stroke is not None]
+        last = _last_pass(fits)
+        doubtful = bool(done and believed[done[-1]])
+        try:
+            if len(fits) < len(strokes):
+                wanted, roomy = strokes[len(fits)], bool(believed[len(fits)])
+                fits.append(_fit(wanted, roomy, last, q0, linker, in_full=doubtful))
+            else:
+                home = _way_home(last, q0, linker)
+        except (CollisionError, ReachError):
+            if not doubtful:
+                raise
+            believed[done[-1]] = False
+            del fits[done[-1] :]
     path: list[Segment] = []
-    done: list[Stroke] = []
+    sprayed: list[Stroke] = []
     passes: list[int] = []
     skipped: list[SkippedStroke] = []
-    last: Pass | None = None
-    for wanted, roomy in zip(strokes, run_out, strict=True):
-        fit = _fit(wanted, roomy, last, q0, linker)
+    for fit in fits:
         skipped += fit.skipped
-        if fit.stroke is None:
-            continue
-        last = _pass(fit.stroke)
-        path += [*fit.link, ToolMove(last, linker.gun)]
-        passes.append(len(path) - 1)
-        done.append(fit.stroke)
-    if strokes and not done:
+        if fit.stroke is not None:
+            path += [*fit.link, ToolMove(_pass(fit.stroke), linker.gun)]
+            passes.append(len(path) - 1)
+            sprayed.append(fit.stroke)
+    if strokes and not sprayed:
         raise CollisionError(f"no stroke can be come to: {skipped[0].reason}")
-    q_end = q0
-    if last is not None:
-        path.append(linker.to_rest(last.end))
-        q_end = end_q(path[-1])
-    path += linker.transit(q_end, linker.q_home)
-    return path, tuple(done), passes, skipped
+    return [*path, *home], tuple(sprayed), passes, skipped
+
+
+def _way_home(last: Pass | None, q0: FloatArray, linker: Linker) -> list[Segment]:
+    """Goes from the last pass, or from rest at `q0`, to rest at home."""
+    if last is None:
+        return linker.transit(q0, linker.q_home)
+    leave = linker.to_rest(last.end)
+    return [leave, *linker.transit(end_q(leave), linker.q_home)]
 
 
 @dataclass(frozen=True)
@@ -306,14 +314,27 @@ class _Fit:
     skipped: list[SkippedStroke]
 
 
+def _last_pass(fits: Sequence["_Fit"]) -> Pass | None:
+    """Returns the pass of the last stroke that can be done, if any."""
+    strokes = [fit.stroke for fit in fits if fit.stroke is not None]
+    return _pass(strokes[-1]) if strokes else None
+
+
 def _fit(
-    wanted: Stroke, roomy: bool, last: Pass | None, q0: FloatArray, linker: Linker
+    wanted: Stroke,
+    roomy: bool,
+    last: Pass | None,
+    q0: FloatArray,
+    linker: Linker,
+    *,
+    in_full: bool = False,
 ) -> _Fit:
     """Joins a stroke to the last pass, or to rest at `q0`, trimming it if need be.
 
     In a corner of the tile, or close to the floor, there may be no room to turn at full
     speed beyond a stroke's end; then the end is trimmed until there is. Where it is
-    `roomy` there is.
+    `roomy` there is. If its start has to be `in_full`, CollisionError or ReachError
+    tells why it cannot be.
     """
     trims = np.array(_TRIMS) / wanted.length
     most = 1.0 - _LEAST_LEFT / wanted.length
@@ -344,6 +365,8 @@ def _fit(
             else:
                 link = linker.between(last.end, start)
         except (CollisionError, ReachError) as error:
+            if in_full:
+                raise
             first_failure = first_failure or str(error)
             continue
         parts = ((0.0, trims[begin]), (1.0 - trims[end], 1.0))
