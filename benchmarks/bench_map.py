@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from perception.depth import CameraIntrinsics
 from perception.mapping.config import MapperConfig
@@ -24,6 +24,7 @@ from perception.mapping.report import session_report
 from perception.mapping.sequences import (
     SequenceConfig,
     WallKind,
+    distance_to_surface,
     outlines,
     render_sequence,
 )
@@ -48,8 +49,9 @@ ROWS = {
 CELL = 0.01
 """Of the thickness, m."""
 DOUBLED = 0.008
-"""A 2 cm cell with points so far apart is doubled, m; cells that a true step crosses,
-or that lie within STEP of one, hold two surfaces in truth and are counted apart."""
+"""A 2 cm cell is doubled, m: where truth has one surface, if two points lie so far
+apart along its normal; where truth has more (a true step crosses the cell or lies
+within STEP of it), if a point lies so far from each of them."""
 STEP = 0.01
 """What a mount's error of 3 mm and 0.3 deg moves along the wall, with 3 mm to spare."""
 
@@ -99,7 +101,7 @@ def run_row(row: str, rate: float, scans: int = 1) -> None:
         f"{ate(list(arm.items()), truth):.2f} mm; links {report['links']}, "
         f"dropped {report['links_dropped']}"
     )
-    print_surface(result, wall)
+    print_surface(result, wall, best_motion(result.poses, truth))
     if with_arm:
         print_observed(mapper, result, truth, arm, report)
     count = len(mapper.graph.keyframes)
@@ -159,14 +161,25 @@ def spoil_links(mapper: Mapper) -> None:
 def ate(
     poses: list[tuple[float, RigidTransform]], truth: dict[float, RigidTransform]
 ) -> float:
-    """Root mean square distance, mm, after the best rigid motion (Horn, 1987)."""
+    """Root mean square distance, mm, after the best rigid motion."""
+    X_TW = best_motion(poses, truth)
+    away = [X_TW @ X.translation() - truth[t].translation() for t, X in poses]
+    return float(1e3 * np.sqrt(np.mean(np.sum(np.square(away), axis=1))))
+
+
+def best_motion(
+    poses: list[tuple[float, RigidTransform]], truth: dict[float, RigidTransform]
+) -> RigidTransform:
+    """Returns X_TW that brings the poses' places closest to the true ones.
+
+    Source: Horn, "Closed-form solution of absolute orientation", 1987.
+    """
     p = np.array([X.translation() for _, X in poses])
     q = np.array([truth[t].translation() for t, _ in poses])
-    p, q = p - p.mean(axis=0), q - q.mean(axis=0)
-    U, _, Vt = np.linalg.svd(p.T @ q)
+    U, _, Vt = np.linalg.svd((p - p.mean(axis=0)).T @ (q - q.mean(axis=0)))
     sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-    away = p @ U @ sign @ Vt - q
-    return float(1e3 * np.sqrt(np.mean(np.sum(away**2, axis=1))))
+    R = (U @ sign @ Vt).T
+    return RigidTransform(RotationMatrix(R), q.mean(axis=0) - R @ p.mean(axis=0))
 
 
 def on_step(p_TQs: np.ndarray, wall: WallKind) -> np.ndarray:
@@ -182,8 +195,14 @@ def on_step(p_TQs: np.ndarray, wall: WallKind) -> np.ndarray:
     return step
 
 
-def print_surface(result: MappingResult, wall: WallKind) -> None:
-    """Prints thickness, doubled cells and bending of the wall's plane."""
+def print_surface(result: MappingResult, wall: WallKind, X_TW: RigidTransform) -> None:
+    """Prints thickness, doubled cells and bending of the wall's plane.
+
+    Args:
+        result: With the map.
+        wall: Which one it is.
+        X_TW: Where the map lies; what no one can know of the mount is no doubling.
+    """
     fused = result.fused
     p_VQs = fused.X_WV.inverse() @ fused.p_WQs
     p_VQs = p_VQs[:, np.abs(p_VQs[2]) < 0.02]
@@ -197,23 +216,31 @@ def print_surface(result: MappingResult, wall: WallKind) -> None:
     np.maximum.at(high, index, z)
     np.minimum.at(low, index, z)
     middle_V = np.vstack([0.02 * (cells + 0.5), np.zeros(cells.shape[1])])
-    step = on_step((fused.X_WV @ middle_V)[:2], wall)
+    step = on_step((X_TW @ fused.X_WV @ middle_V)[:2], wall)
     doubled = high - low > DOUBLED
+    by_step, away = strays(X_TW @ fused.p_WQs, wall)
     # A quadric through the wall: how far it leaves its plane over 2 m.
     terms = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
     quadric = np.linalg.lstsq(terms, z, rcond=None)[0]
     bend = terms[:, :3] @ quadric[:3]
     within = (np.abs(x) < 1.0) & (np.abs(y) < 1.0)
-    flat, edge = (
-        f"{np.count_nonzero(doubled & part)} of {np.count_nonzero(part)}"
-        for part in (~step, step)
-    )
+    flat = f"{np.count_nonzero(doubled[~step])} of {np.count_nonzero(~step)}"
     bent = 1e3 * np.ptp(bend[within])
     print(
         f"  wall at 1 cm cells: 5-95 % {1e3 * thick:.2f} mm; doubled 2 cm cells "
-        f"{flat}, at steps {edge}; bending over 2 m {bent:.2f} mm; "
-        f"carved {fused.carved}"
+        f"{flat}, by steps {by_step}; no point farther than {1e3 * away:.1f} mm from a "
+        f"true surface; bending over 2 m {bent:.2f} mm; carved {fused.carved}"
     )
+
+
+def strays(p_TQs: np.ndarray, wall: WallKind) -> tuple[str, float]:
+    """Returns how many cells by true steps are doubled, and how far off a point is."""
+    cells, index = np.unique(np.floor(p_TQs[:2] / 0.02), axis=1, return_inverse=True)
+    away = np.zeros(cells.shape[1])
+    np.maximum.at(away, index.ravel(), distance_to_surface(p_TQs, wall))
+    step = on_step(0.02 * (cells + 0.5), wall)
+    doubled = np.count_nonzero(away[step] > DOUBLED)
+    return f"{doubled} of {np.count_nonzero(step)}", float(away.max())
 
 
 def print_observed(mapper, result, truth, arm, report) -> None:

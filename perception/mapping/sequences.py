@@ -93,6 +93,33 @@ def outlines(wall: WallKind) -> list[tuple[float, float, float, float]]:
     return [(part[0], part[1], part[2], part[3]) for part in (_RECESS, *_BOXES)]
 
 
+def distance_to_surface(p_TQs: FloatArray, wall: WallKind) -> FloatArray:
+    """Returns how far points are from the nearest surface of a wall.
+
+    Args:
+        p_TQs: (3, n) m, in T.
+        wall: Which one; its boundless front, its recess and its boxes count.
+
+    Returns:
+        (n,) m.
+    """
+    front = np.abs(p_TQs[2])
+    if wall not in _SOLID:
+        return np.asarray(front)
+    others = np.full_like(front, np.inf)
+    *opening, deep = _RECESS
+    for x0, y0, x1, y1, height in ((*opening, -deep), *_BOXES):
+        low = np.array([[x0], [y0], [min(height, 0.0)]])
+        high = np.array([[x1], [y1], [max(height, 0.0)]])
+        beside = np.any((p_TQs[:2] <= low[:2]) | (p_TQs[:2] >= high[:2]), axis=0)
+        front = np.where(beside, front, np.inf)  # The front has a hole there.
+        for axis, value in ((0, x0), (0, x1), (1, y0), (1, y1), (2, height)):
+            nearest = np.clip(p_TQs, low, high)
+            nearest[axis] = value
+            others = np.minimum(others, np.linalg.norm(p_TQs - nearest, axis=0))
+    return np.asarray(np.minimum(front, others))
+
+
 def render_sequence(
     config: SequenceConfig, seed: int
 ) -> Iterator[tuple[Frame, RigidTransform]]:

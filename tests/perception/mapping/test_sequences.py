@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from perception.config import StereoConfig
 from perception.depth import CameraIntrinsics
@@ -10,6 +10,7 @@ from perception.mapping.sequences import (
     SequenceConfig,
     WallKind,
     _cast,
+    distance_to_surface,
     render_sequence,
 )
 
@@ -38,6 +39,39 @@ def test_recess_and_boxes_are_cast_at_their_depth():
         cast, hit_x, hit_y = _cast(RigidTransform(looking, [x, y, 0.7]), camera, True)
         assert cast[240, 424] == pytest.approx(depth, abs=1e-4)
         assert (hit_x[240, 424], hit_y[240, 424]) == pytest.approx((x, y), abs=2e-3)
+
+
+def test_what_is_cast_lies_on_a_surface():
+    camera = CameraIntrinsics.from_stereo(StereoConfig())
+    looking = RotationMatrix(np.diag([1.0, -1.0, -1.0]))
+    R_WC = looking @ RollPitchYaw(0.1, -0.2, 0.3).ToRotationMatrix()
+    X_WC = RigidTransform(R_WC, [1.0, 1.0, 0.9])
+    depth, x, y = _cast(X_WC, camera, True)
+    u = (np.arange(camera.width) - camera.cx) / camera.fx
+    v = (np.arange(camera.height) - camera.cy)[:, None] / camera.fy
+    rays = np.stack([*np.broadcast_arrays(u, v), np.ones_like(depth)])
+    height = 0.9 + depth * np.tensordot(R_WC.matrix()[2], rays, axes=1)
+    assert np.ptp(height) > 0.15  # Into the recess, and onto a box.
+    hit = np.stack([x, y, height]).reshape(3, -1).astype(float)
+    assert distance_to_surface(hit, WallKind.WINDOW).max() < 1e-5
+
+
+def test_points_beside_the_surfaces_are_as_far_as_they_are():
+    # Before the front; in the recess, 0.75 to 1.35 m, by its left side and its back;
+    # above a box's front, 6 cm out; inside the box, 1 cm under its front.
+    p_TQs = np.array(
+        [
+            [1.8, 1.8, 0.03],
+            [0.76, 1.2, -0.06],
+            [1.0, 1.2, -0.10],
+            [0.3, 0.4, 0.08],
+            [0.3, 0.4, 0.05],
+        ]
+    ).T
+    away = distance_to_surface(p_TQs, WallKind.WINDOW)
+    np.testing.assert_allclose(away, [0.03, 0.01, 0.02, 0.02, 0.01], atol=1e-12)
+    bare = distance_to_surface(p_TQs, WallKind.BLANK)
+    np.testing.assert_allclose(bare, np.abs(p_TQs[2]))
 
 
 def test_the_arm_is_off_by_what_was_injected():
