@@ -13,14 +13,10 @@ from perception.depth import CameraIntrinsics
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.graph import Estimate, Graph, Problem, Settled, Sighting
 from perception.mapping.keyframe import Keyframe, PlaneSight
-from perception.mapping.links import (
-    Link,
-    LinkKind,
-    link_by_appearance,
-    link_by_geometry,
-)
+from perception.mapping.links import Link
 from perception.mapping.observability import observed_directions, prior_sigmas
-from perception.mapping.poses import Poses
+from perception.mapping.poses import Poses, angle_deg
+from perception.mapping.registration import find_links, overlap
 from perception.values import FloatArray, FrozenValue, IntArray
 from perception.wall import upright_rotation
 
@@ -29,13 +25,6 @@ _Part = TypeVar("_Part")
 _PLANE_ANGLE_DEG = 5.0
 _PLANE_DISTANCE = 0.03
 """A plane is a known one if it is no farther off than this."""
-_RECENT = 2
-"""Keyframes back that a new one is always registered to."""
-_CANDIDATES = 12
-"""Older keyframes, the nearest ones, whose overlap is looked at."""
-_GATE = 0.03
-"""A link farther from the arm's relative pose than this, m, is no link."""
-_GATE_DEG = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +102,8 @@ class KeyframeGraph(FrozenValue):
             return True
         if angle_deg(X_KC.rotation()) > config.keyframe_angle_deg:
             return True
-        overlap = self._overlap(self.keyframes[-1], X_KC.inverse())
-        return overlap < 1.0 - config.keyframe_coverage
+        seen = overlap(self.keyframes[-1], X_KC.inverse(), self.intrinsics)
+        return seen < 1.0 - config.keyframe_coverage
 
     def extended(
         self,
@@ -137,7 +126,9 @@ class KeyframeGraph(FrozenValue):
             base=self.base.followed_by(base),
         )
         if links is None:
-            links = grown._find_links(index)
+            links = find_links(
+                grown.keyframes, grown.poses, self.intrinsics, self.config
+            )
         planes, sightings = list(self.planes), list(self.sightings)
         for sight in keyframe.planes:
             number = _associate(sight, X_WC, planes)
@@ -262,62 +253,6 @@ class KeyframeGraph(FrozenValue):
         middle = np.mean([X.translation() for X in self.poses], axis=0)
         return RigidTransform(R, middle - (normal_W @ middle - offset) * normal_W)
 
-    def _overlap(self, keyframe: Keyframe, X_CK: RigidTransform) -> float:
-        """Returns the share of a keyframe's points that another pose sees."""
-        camera = self.intrinsics
-        points = keyframe.points(camera, step=16)
-        if not points.size:
-            return 0.0
-        x, y, z = X_CK @ points
-        z = np.maximum(z, 1e-3)
-        u, v = camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
-        inside = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
-        return float(inside.mean())
-
-    def _find_links(self, index: int) -> list[Link]:
-        """Registers a keyframe to the last ones and to older ones that it overlaps."""
-        if not self.config.max_links:
-            return []
-        recent = list(range(max(0, index - _RECENT), index))
-        places = np.array([X.translation() for X in self.poses])
-        away = np.linalg.norm(places[: max(0, index - _RECENT)] - places[index], axis=1)
-        older = [
-            (self._overlap(self.keyframes[k], self._relative(index, k)), k)
-            for k in np.argsort(away)[:_CANDIDATES].tolist()
-        ]
-        older = sorted((pair for pair in older if pair[0] > 0.3), reverse=True)
-        # The nearest in the picture, but no two neighbours of each other.
-        chosen: list[int] = []
-        for _, k in older:
-            if all(abs(k - other) > 1 for other in chosen):
-                chosen.append(k)
-        chosen = [*recent, *chosen][: self.config.max_links]
-        found = [self._register(k, index) for k in chosen]
-        return [link for link in found if link is not None]
-
-    def _relative(self, i: int, j: int) -> RigidTransform:
-        return self.poses[i].inverse() @ self.poses[j]
-
-    def _register(self, i: int, j: int) -> Link | None:
-        """Links two keyframes by appearance, or else by geometry."""
-        a, b, guess = self.keyframes[i], self.keyframes[j], self._relative(i, j)
-        link, _ = link_by_appearance(
-            a.features, b.features, self.intrinsics, self.config, (i, j)
-        )
-        if link is None:
-            grids = a.grid(self.intrinsics), b.grid(self.intrinsics)
-            link = link_by_geometry(*grids, guess, self.intrinsics, self.config, (i, j))
-        if link is None:
-            return None
-        off = guess.inverse() @ link.X_ij
-        arm = a.X_arm is not None and b.X_arm is not None
-        if (arm or link.kind is LinkKind.GEOMETRY) and (
-            np.linalg.norm(off.translation()) > _GATE
-            or angle_deg(off.rotation()) > _GATE_DEG
-        ):
-            return None
-        return link
-
 
 @dataclass(frozen=True, eq=False)
 class Solution(FrozenValue):
@@ -341,12 +276,6 @@ class Solution(FrozenValue):
         turn, shift = self.estimate.mount[:3], self.estimate.mount[3:]
         R = Rotation.from_rotvec(turn.copy()).as_matrix()
         return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), shift)
-
-
-def angle_deg(R: RotationMatrix) -> float:
-    """Returns the angle of a rotation, deg."""
-    cos = (np.trace(R.matrix()) - 1.0) / 2.0
-    return float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0))))
 
 
 def _of_number(

@@ -10,8 +10,9 @@ from scipy import sparse
 
 from perception.errors import PerceptionError
 from perception.mapping.keyframe import Keyframe
-from perception.mapping.keyframe_graph import KeyframeGraph, angle_deg
+from perception.mapping.keyframe_graph import KeyframeGraph
 from perception.mapping.links import link_by_appearance
+from perception.mapping.poses import angle_deg
 from perception.mapping.view import Features
 
 _TABLES = 12

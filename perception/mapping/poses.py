@@ -102,3 +102,9 @@ class Poses:
             RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
             for R, p in zip(self.R, self.p, strict=True)
         ]
+
+
+def angle_deg(R: RotationMatrix) -> float:
+    """Returns the angle of a rotation, deg."""
+    cos = (np.trace(R.matrix()) - 1.0) / 2.0
+    return float(np.degrees(np.arccos(np.clip(cos, -1.0, 1.0))))

@@ -6,9 +6,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.config import StereoConfig
 from perception.mapping.config import MapperConfig
-from perception.mapping.keyframe_graph import angle_deg
 from perception.mapping.mapper import Mapper
 from perception.mapping.places import NotLocalisedError, Places, joined, localise
+from perception.mapping.poses import angle_deg
 from perception.mapping.sequences import SequenceConfig, WallKind, render_sequence
 
 # Where the base was put afterwards, seen from where it was.
