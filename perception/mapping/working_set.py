@@ -1,6 +1,7 @@
 """The keyframes that are in memory and solved for; the others wait in a file."""
 
 import sqlite3
+import weakref
 from collections import OrderedDict
 from dataclasses import dataclass
 
@@ -32,6 +33,7 @@ class WorkingSet:
         self._views: OrderedDict[int, View] = OrderedDict()
         # An empty name is a file that SQLite removes; two MB of it are in memory.
         self._db = sqlite3.connect("", isolation_level=None)
+        weakref.finalize(self, self._db.close)
         self._db.execute("CREATE TABLE views (k INTEGER PRIMARY KEY, data BLOB)")
 
     @property
