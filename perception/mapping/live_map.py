@@ -43,6 +43,9 @@ class LiveMap(FrozenValue):
     are fused again where they really were taken. Below that the arm is believed: a scan
     by a good arm gives the same map, to the bit, as without the graph.
 
+    Time and memory are those of one tile's scan: a restart drops the pictures. What is
+    to go on for longer is a `Mapper`'s work.
+
     Attributes:
         voxels: Fused by the arm's poses and `X_CCm`.
         pictures: What is in them.
