@@ -31,6 +31,7 @@ from painter.canopen.realtime import (
     Ticker,
     lock_memory,
     settle_memory,
+    stay_awake,
     use_fifo,
 )
 from painter.canopen.sample_ring import SampleRing, Samples
@@ -106,6 +107,11 @@ class BusLoop:
         self._is_fifo = use_fifo()
         settle_memory()
         lock_memory()
+        with stay_awake():
+            self._cycle_until_ended()
+        self._link.close()
+
+    def _cycle_until_ended(self) -> None:
         per_second = max(1, round(1.0 / self._ticker.period))
         count = 0
         self._ticker.begin()  # Locking took a second.
@@ -131,7 +137,6 @@ class BusLoop:
                     self._is_fifo,
                 )
             )
-        self._link.close()
 
     def _pause(self) -> None:
         """Leaves the processor for a moment while the link cannot be waited for."""

@@ -4,6 +4,8 @@ import ctypes
 import gc
 import logging
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +21,9 @@ LEAD = 0.0005
 # Source: Linux, include/uapi/linux/mman.h and prctl.h.
 _MCL_CURRENT_AND_FUTURE = 3
 _PR_SET_TIMERSLACK = 29
+# Source: Linux, Documentation/power/pm_qos_interface.rst: an int32 of microseconds,
+# which counts for as long as the file is open.
+_WAKE_UP_LATENCY = "/dev/cpu_dma_latency"
 _KEPT = 12_000  # A minute at 200 Hz; sorting them takes less than a cycle.
 
 
@@ -59,6 +64,29 @@ def use_fifo(priority: int = _PRIORITY) -> bool:
         )
         return False
     return True
+
+
+@contextmanager
+def stay_awake() -> Iterator[bool]:
+    """Keeps idle processors from sleeping so deep that they wake up late.
+
+    On a robot's computer that is its C-states, in a virtual machine the halt after
+    which the host gives a core to others.
+
+    Yields:
+        Whether they are kept awake; if not, it is logged.
+    """
+    try:
+        file = os.open(_WAKE_UP_LATENCY, os.O_WRONLY)
+    except OSError as error:
+        _LOGGER.info("processors may sleep: %s", error)
+        yield False
+        return
+    try:
+        os.write(file, (0).to_bytes(4, "little"))
+        yield True
+    finally:
+        os.close(file)
 
 
 def prefer(niceness: int) -> None:

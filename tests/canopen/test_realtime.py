@@ -100,6 +100,22 @@ def test_without_the_right_to_fifo_there_is_a_warning(monkeypatch, caplog):
     assert "no SCHED_FIFO" in caplog.text
 
 
+def test_processors_are_asked_to_stay_awake_for_as_long_as_it_matters(
+    monkeypatch, tmp_path
+):
+    file = tmp_path / "cpu_dma_latency"
+    monkeypatch.setattr(realtime, "_WAKE_UP_LATENCY", str(file))
+    with realtime.stay_awake() as is_awake:
+        assert not is_awake  # No such file: as on a machine that is not Linux.
+    file.write_bytes(b"")
+    open_before = len(os.listdir("/proc/self/fd"))
+    with realtime.stay_awake() as is_awake:
+        assert is_awake
+        assert file.read_bytes() == b"\0\0\0\0"
+        assert len(os.listdir("/proc/self/fd")) == open_before + 1
+    assert len(os.listdir("/proc/self/fd")) == open_before
+
+
 def test_a_niceness_that_may_not_be_had_is_no_error(monkeypatch):
     asked = []
 
