@@ -4,8 +4,7 @@
 `painter deploy` as processes of their own, lets them paint, and compares the figures
 with those of `painter simulate`. Exit status 1 if one differs by more than 10 %. Four
 processes at once: on two cores take `--rate 0.5`, which gives all of them twice the
-time; where the computer stands still for over 10 ms at times (a virtual machine does),
-`--rate 0.2`. How many cycles were skipped for that is said: each leaves the arm 5 ms
+time. How many cycles the bus skipped all the same is said: each leaves the arm 5 ms
 behind for a quarter of a second.
 """
 
