@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter
 from painter.planning.config import RasterConfig
 from painter.planning.film_cost import FilmCost, stroke_cost
 from painter.planning.film_model import FilmModel, Line
-from perception.values import BoolArray, FloatArray, IntArray
+from perception.values import BoolArray, FloatArray
 
 # Steps across, along (m), of flow (share) and stand-off (m): coarse, then fine.
 _STEPS = (
@@ -30,6 +30,10 @@ _SHORTEST_LEANING = 0.15  # m
 MOST_LEAN = 0.3
 LEAST_FLOW = 0.08  # A valve does not dose less.
 _GAIN = 1e-6  # m², least gain of a step.
+# A step that failed is tried again once the film on its cells has changed by more than
+# its loss over this, all changes of all cells added up. Of 364 steps that helped at a
+# later try none would be missed with 2, ten with 1 and 20 with 1/2.
+_LOSS_FOR_CHANGE = 2.0
 # The gun's half width and the clearance around it, m, and the clearance before it.
 _GUN_REACH = 0.07
 _GUN_FRONT = 0.05
@@ -64,6 +68,20 @@ class _Window(NamedTuple):
 _Step = tuple[str, float]  # A number of a span, and by how much it varies.
 
 
+class _Loss(NamedTuple):
+    """What a step lost when it was tried.
+
+    Attributes:
+        area: m²
+        window: The cells that it would have changed.
+        moved: By how much the film had changed there until then, m².
+    """
+
+    area: float
+    window: _Window
+    moved: float
+
+
 class _Laid:
     """A span with the film that it leaves, and the steps of it that did not help."""
 
@@ -73,11 +91,10 @@ class _Laid:
         """Takes a span, its film on the cells that it reaches, and if it has room."""
         self.span, self.window, self.film = span, window, film
         self.has_room = has_room
-        # At which change of the film steps were last tried, and on which cells; None:
-        # they cannot be made.
-        self.failed: dict[_Step, tuple[int, _Window] | None] = {}
-        # At which change of the film it was last found to be worth its time.
-        self.kept: int | None = None
+        # What steps lost that were tried in vain; None: they cannot be made.
+        self.failed: dict[_Step, _Loss | None] = {}
+        # What dropping it lost.
+        self.kept: _Loss | None = None
 
 
 class FilmFit:
@@ -108,15 +125,15 @@ class FilmFit:
             self.film += film
         self._laid: list[_Laid] = []
         self._model, self._cost, self._raster = model, cost, raster
+        self._cell_costs = cost.on(site.wanted, site.clean)
         size = 2 * round(_GUN_REACH / site.cell) + 1
         self._tops = maximum_filter(site.height, size=size) + _GUN_FRONT
         self._tops[self._tops <= _GUN_FRONT] = 0.0  # The wall has its own clearance.
         self._tops = np.maximum(self._tops, site.nearest)
-        # While spans are fitted: what each cell costs, and at which change of the film
-        # it last changed.
+        # While spans are fitted: what each cell costs, and by how much its film has
+        # changed, all changes added up.
         self._costs: FloatArray = np.zeros(site.wanted.shape)
-        self._changed: IntArray = np.zeros(site.wanted.shape, dtype=np.int64)
-        self._changes = 0
+        self._moved: FloatArray = np.zeros(site.wanted.shape)
 
     @property
     def spans(self) -> tuple[Span, ...]:
@@ -150,8 +167,7 @@ class FilmFit:
 
     def fit(self) -> None:
         """Varies the spans until nothing helps; drops those that are worth nothing."""
-        site = self._model.site
-        self._costs = self._cost(self.film, site.wanted, site.clean)
+        self._costs = self._cell_costs(self.film)
         for across, along, flow, standoff in _STEPS:
             for _ in range(_PASSES):
                 changes = sum(
@@ -229,7 +245,7 @@ class FilmFit:
         laid = self._laid[index]
         if step in laid.failed:
             last = laid.failed[step]
-            if last is None or self._unchanged_since(*last):
+            if last is None or self._still_loses(last):
                 return False
         span, trial = laid.span, self._varied(laid, *step)
         if trial is None:
@@ -248,32 +264,36 @@ class FilmFit:
         part = _part(film, changed, laid.window)
         part -= _part(laid.film, laid.window, changed)
         part = _part(film, changed, reached)
-        part += self._film(trial, line, reached)
+        if name == "flow":
+            part += laid.film * (trial.flow / span.flow)
+        else:
+            part += self._film(trial, line, reached)
         costs = self._cell_costs(film, changed)
         gain = float((self._costs[changed] - costs).sum()) * self._model.site.cell**2
         gain += stroke_cost(span.high - span.low) - stroke_cost(trial.high - trial.low)
         if gain < _GAIN:
-            laid.failed[step] = (self._changes, changed)
+            laid.failed[step] = self._loss(-gain, changed)
             return False
         self._change(changed, film, costs)
         laid = self._laid[index] = self._lay(trial, has_room=True)
         # The step back would only undo this one.
-        laid.failed[name, -size] = (self._changes, changed)
+        laid.failed[name, -size] = self._loss(gain, changed)
         return True
 
     def _drop(self) -> int:
         """Drops spans without which the film costs no more; returns how many."""
         kept: list[_Laid] = []
         for laid in self._laid:
-            if laid.kept is None or not self._unchanged_since(laid.kept, laid.window):
+            if laid.kept is None or not self._still_loses(laid.kept):
                 film = self.film[laid.window] - laid.film
                 costs = self._cell_costs(film, laid.window)
                 loss = float((costs - self._costs[laid.window]).sum())
-                length = laid.span.high - laid.span.low
-                if loss * self._model.site.cell**2 < stroke_cost(length):
+                loss *= self._model.site.cell**2
+                loss -= stroke_cost(laid.span.high - laid.span.low)
+                if loss < 0.0:
                     self._change(laid.window, film, costs)
                     continue
-            laid.kept = self._changes
+                laid.kept = self._loss(loss, laid.window)
             kept.append(laid)
         dropped = len(self._laid) - len(kept)
         self._laid = kept
@@ -281,16 +301,19 @@ class FilmFit:
 
     def _change(self, window: _Window, film: FloatArray, costs: FloatArray) -> None:
         """Takes over a film and its costs on a window."""
+        self._moved[window] += np.abs(film - self.film[window])
         self.film[window], self._costs[window] = film, costs
-        self._changes += 1
-        self._changed[window] = self._changes
 
-    def _unchanged_since(self, change: int, window: _Window) -> bool:
-        return bool(self._changed[window].max() <= change)
+    def _loss(self, area: float, window: _Window) -> _Loss:
+        return _Loss(area, window, self._moved_on(window))
 
-    def _cell_costs(self, film: FloatArray, window: _Window) -> FloatArray:
-        site = self._model.site
-        return self._cost(film, site.wanted[window], site.clean[window])
+    def _still_loses(self, last: _Loss) -> bool:
+        """Tells that the film has changed too little for a step to help now."""
+        moved = self._moved_on(last.window) - last.moved
+        return last.area >= _LOSS_FOR_CHANGE * moved
+
+    def _moved_on(self, window: _Window) -> float:
+        return float(self._moved[window].sum()) * self._model.site.cell**2
 
     def _lay(self, span: Span, has_room: bool) -> _Laid:
         line, window = self._reached(span)

@@ -158,6 +158,7 @@ class FilmModel:
         self._tip = tip
         self._dose = tip.flow * tip.transfer_efficiency / (speed * nominal)
         self._speed = speed
+        _, self._spread = half_axes(tip, 1.0)  # Half the fan's thickness at 1 m.
         self._cdf = betainc(tip.gamma + 1.0, tip.gamma + 1.0, 0.5 + 0.5 * _TABLE)
         self._across = betainc(tip.beta2, tip.beta2, 0.5 + 0.5 * _TABLE)
         self._lines: dict[tuple[float, float, float, int, int], Line] = {}
@@ -170,7 +171,7 @@ class FilmModel:
             high: Where it ends or begins, m in T y.
             standoff: From which it is sprayed, m.
         """
-        _, b = half_axes(self._tip, standoff)
+        b = self._spread * standoff
         return slice(self.site.row(low - b), self.site.row(high + b) + 1)
 
     def line(
@@ -237,53 +238,105 @@ class FilmModel:
         self, x_line: float, standoff: float, lean: float, low: int, high: int
     ) -> Line:
         """Makes a line on the rows from `low` up to `high`."""
-        site, cell = self.site, self.site.cell
-        a, b = half_axes(self._tip, standoff)
-        count = site.wanted.shape[1]
+        a, _ = half_axes(self._tip, standoff)
         # What lies back is reached by rays that went past the fan's width on the wall.
-        reach = int(np.ceil((1.0 - site.deepest / standoff) * a / cell)) + 1
-        # Rows that are as the one below them are looked at once.
-        rows, back = np.arange(low, high), np.arange(high - low)
+        reach = math.ceil((1.0 - self.site.deepest / standoff) * a / self.site.cell) + 1
         if lean == 0.0:
-            column = math.floor(x_line / cell) + site.border
-            first = min(max(column - reach, 0), count - 1)
-            window = slice(first, max(column + reach, 0) + 1)
-            new: BoolArray = np.array(site.steps[low:high, window].any(axis=1))
-            new[0] = True
-            rows, back = rows[new], np.cumsum(new) - 1
+            return self._make_upright(x_line, standoff, reach, low, high)
+        return self._make_leaning(x_line, standoff, lean, reach, low, high)
+
+    def _make_upright(
+        self, x_line: float, standoff: float, reach: int, low: int, high: int
+    ) -> Line:
+        """Makes a line that goes straight up: all rows have the same columns."""
+        site, cell = self.site, self.site.cell
+        count = site.wanted.shape[1]
+        middle = math.floor(x_line / cell) + site.border
+        first = min(max(middle - reach, 0), count - 1)
+        end = min(max(middle + reach, first) + 1, count)
+        # Rows that are as the one below them are looked at once.
+        new: BoolArray = np.array(site.steps[low:high, first:end].any(axis=1))
+        new[0] = True
+        rows = np.flatnonzero(new)
+        columns = np.arange(middle - reach, middle + reach + 1)
+        inside = np.minimum(np.maximum(columns, 0), count - 1)
+        drop = standoff - site.height[low + rows[:, None], inside]
+        edges = (np.append(columns, columns[-1] + 1) - site.border) * cell - x_line
+        share = self._shares(drop, edges, standoff, reach)
+        share *= self._dose / cell
+        landed = share[:, first - columns[0] : end - columns[0]]
+        if rows.size > 1:
+            landed = landed[np.cumsum(new) - 1]
+        shape = (high - low, end - first)
+        thickness = self._thickness(site.x[first:end] - x_line, standoff)
+        return Line(
+            (first, end),
+            low,
+            np.broadcast_to(landed, shape),
+            np.broadcast_to(thickness, shape),
+        )
+
+    def _make_leaning(
+        self,
+        x_line: float,
+        standoff: float,
+        lean: float,
+        reach: int,
+        low: int,
+        high: int,
+    ) -> Line:
+        """Makes a line that goes across as it goes up: each row has its own columns."""
+        site, cell = self.site, self.site.cell
+        count = site.wanted.shape[1]
+        rows = np.arange(low, high)
         axis = (x_line + lean * site.y[rows])[:, None]
         middle = np.floor(axis / cell).astype(int) + site.border
         columns = middle + np.arange(-reach, reach + 1)
         height = site.height[
             rows[:, None], np.minimum(np.maximum(columns, 0), count - 1)
         ]
-        drop = np.maximum(standoff - height, 1e-6)
         edges = (columns[:, :1] - site.border) * cell - axis
         edges = edges + cell * np.arange(2 * reach + 2)
-        # The steepest ray that has landed by each column's far edge, on either side of
-        # the axis; a column higher than the nozzle stops them all.
-        outwards = np.stack([edges[:, reach + 1 :], -edges[:, reach::-1]])
-        drops = np.stack([drop[:, reach:], drop[:, reach::-1]])
-        right, left = self._landed(outwards, drops, standoff / a)
-        share = np.empty_like(drop)
-        share[:, reach:] = right
-        share[:, reach - 1 :: -1] = left[:, 1:]
-        share[:, reach] += left[:, 0]
+        share = self._shares(standoff - height, edges, standoff, reach)
         # Leaning, a metre of the stroke is less than a metre up.
         share *= math.hypot(1.0, lean) * self._dose / cell
 
         ends = int(middle[0, 0]), int(middle[-1, 0])
         first = min(max(min(ends) - reach, 0), count - 1)
         end = min(max(max(ends) + reach, first) + 1, count)
-        landed = np.zeros((rows.size, end - first))
+        film = np.zeros((rows.size, end - first))
         inside = (columns >= first) & (columns < end)
         row, _ = np.nonzero(inside)
-        landed[row, columns[inside] - first] = share[inside]
-        # Upright the axis is the same on all rows.
-        offset = (site.x[first:end] - (axis if lean else axis[:1])) / a
-        thin = b * np.sqrt(np.maximum(1.0 - offset**2, 1e-4))
-        film = landed[back]
-        return Line((first, end), low, film, np.broadcast_to(thin, film.shape))
+        film[row, columns[inside] - first] = share[inside]
+        thickness = self._thickness(site.x[first:end] - axis, standoff)
+        return Line((first, end), low, film, thickness)
+
+    def _thickness(self, offset: FloatArray, standoff: float) -> FloatArray:
+        """Returns half the fan's thickness, m, over places off its axis, m."""
+        a, b = half_axes(self._tip, standoff)
+        return np.asarray(b * np.sqrt(np.maximum(1.0 - (offset / a) ** 2, 1e-4)))
+
+    def _shares(
+        self, drop: FloatArray, edges: FloatArray, standoff: float, reach: int
+    ) -> FloatArray:
+        """Returns the flow's share on each column.
+
+        Args:
+            drop: (k, 2 `reach` + 1) m, nozzle over each column.
+            edges: (k or none, 2 `reach` + 2) m, of the columns, from the spray axis,
+                which is over the middle one.
+            standoff: Nozzle to wall, m.
+            reach: Columns on either side of the axis.
+        """
+        a, _ = half_axes(self._tip, standoff)
+        drop = np.maximum(drop, 1e-6)
+        # The steepest ray that has landed by each column's far edge, on either side of
+        # the axis; a column higher than the nozzle stops them all.
+        right = self._landed(edges[..., reach + 1 :], drop[:, reach:], standoff / a)
+        left = self._landed(-edges[..., reach::-1], drop[:, reach::-1], standoff / a)
+        share = np.concatenate([left[:, :0:-1], right], axis=1)
+        share[:, reach] += left[:, 0]
+        return share
 
     def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:
         """Returns the flow's share on each column outwards from the spray axis.

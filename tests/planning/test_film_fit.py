@@ -270,6 +270,25 @@ def test_cost_of_single_cells():
     assert cost[2:].tolist() == [0.0, 0.0]
 
 
+def test_cost_is_a_parabola_and_a_ramp():
+    """Weights 2, 3 and 5; ramps from 0.9 down to 0.7 and from 0.1 up to 0.2."""
+    dut = FilmCost(2.0, 3.0, (0.9, 0.7), (0.1, 0.2), 5.0)
+    film = np.array([1.4, 0.8, 0.2])
+    wanted = np.array([True, True, True])
+    nowhere = ~wanted
+    expected = [2.0 * 0.4**2, 2.0 * 0.2**2 + 0.5, 2.0 * 0.8**2 + 1.0]
+    np.testing.assert_allclose(dut(film, wanted, nowhere), expected)
+    film = np.array([0.05, 0.16, 0.5])
+    soiled = 3.0 * film + [0.0, 5.0 * 0.6, 5.0]
+    np.testing.assert_allclose(dut(film, nowhere, wanted), soiled)
+    np.testing.assert_allclose(dut(film, nowhere, nowhere), 3.0 * film)
+    # On some of the cells, as on all.
+    cells = dut.on(np.array([[True, False]] * 2), np.array([[False, True]] * 2))
+    films = np.array([[1.4, 0.16], [0.8, 0.5]])
+    window = (slice(1, 2), slice(0, 2))
+    np.testing.assert_array_equal(cells(films[1:], window), cells(films)[1:])
+
+
 def test_blank_wall_keeps_to_the_raster():
     mask = wall()
     strokes = plan_strokes(mask, CELL, tip=TIP, raster=RASTER)
