@@ -1,11 +1,15 @@
 """Planning time of a tile by stage, one core, without the first import.
 
 Run `taskset -c 0 python -m benchmarks.bench_planner [SCENE ...]`; a scene is the name
-of a scenario or `random:SEED`. Edges of masks are exact and heights as noisy as a map
-gives them; a cycle's planning is that of the masks that it has sensed. `crowded` has
-ten objects, as the issue's bound on planning has.
+of a scenario, `random:SEED` or `crowded`, which has ten boxes. Edges of masks are exact
+and heights as noisy as a map gives them; a cycle's planning is that of the masks that
+it has sensed. Times are of the processor, the median of some runs. With `--bound`
+the exit status is 1 if a scene takes longer.
 """
 
+import argparse
+import math
+import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -34,7 +38,6 @@ STAGES: dict[str, tuple[Any, str]] = {
     "verify": (program, "verify_motion"),
     "verify strokes": (program, "verify_strokes"),
 }
-REPEATS = 3
 NOISE = 0.002  # m, of mapped heights.
 # x, y, width, height in T and height over the wall, m: five in each of two columns,
 # nowhere in one line, so that each wants cut-ins of its own.
@@ -46,17 +49,52 @@ CROWD = [
 
 
 def main() -> None:
-    """Prints a line for each scene: the quickest of some runs, s."""
+    """Prints a line for each scene: the median of some runs, s."""
+    options = parsed()
     planner = MakeProgramPlanner(load_scenario("blank"))
     plan(planner, wall_of("blank"))  # What is loaded and cached once is not counted.
     print(f"{'scene':10} strokes   total  " + "  ".join(STAGES) + "  rest")
-    for scene in sys.argv[1:] or SCENES:
+    late = []
+    for scene in options.scenes:
         wall = wall_of(scene)
-        runs = [timed(planner, wall) for _ in range(REPEATS)]
-        strokes, total, stages = min(runs, key=lambda run: run[1])
+        runs = [timed(planner, wall) for _ in range(options.repeats)]
+        total = statistics.median(total for _, total, _ in runs)
+        stages = {
+            name: statistics.median(stages[name] for _, _, stages in runs)
+            for name in STAGES
+        }
         cells = [f"{stages[name]:{len(name)}.2f}" for name in STAGES]
         cells.append(f"{total - sum(stages.values()):4.2f}")
-        print(f"{scene:10} {strokes:7d} {total:5.2f} s  " + "  ".join(cells))
+        print(f"{scene:10} {runs[0][0]:7d} {total:5.2f} s  " + "  ".join(cells))
+        if total > options.bound:
+            late.append(f"{scene} {total:.2f} s")
+    if late:
+        sys.exit(f"over {options.bound:g} s: {', '.join(late)}")
+
+
+def parsed() -> argparse.Namespace:
+    """Returns what was asked for on the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument(
+        "scenes",
+        nargs="*",
+        default=SCENES,
+        metavar="SCENE",
+        help=f"scenario, random:SEED or crowded; default {' '.join(SCENES)}",
+    )
+    parser.add_argument(
+        "--repeats", type=int, default=3, help="runs of each scene; default 3"
+    )
+    parser.add_argument(
+        "--bound",
+        type=float,
+        default=math.inf,
+        help="most time of a scene, s; exit status 1 if one takes longer; default none",
+    )
+    options = parser.parse_args()
+    if options.repeats < 1:
+        parser.error(f"--repeats must be >= 1, got {options.repeats}.")
+    return options
 
 
 def wall_of(scene: str) -> WallSegmentation:
