@@ -119,7 +119,9 @@ class ArmBus:
             raise BusError("cannot acknowledge: the e-stop chain is open.")
         self.reason, self._stopped_at = "", 0.0
         self._follower.release()
-        self._begin(self._start_up([n for n in self.nodes if not self._is_sound(n)]))
+        self._begin(
+            self._start_up([n for n in self.nodes if not n.is_sound(self._now)])
+        )
 
     def push(self, points: Sequence[Setpoint]) -> None:
         """Adds setpoints; while no motion is allowed they are dropped.
@@ -352,12 +354,6 @@ class ArmBus:
         )
         if complaint is not None and held:
             self.stop(complaint, quick=True)
-
-    def _is_sound(self, node: NodeClient) -> bool:
-        """Whether a node can go on without being configured anew."""
-        recent = self._now - node.heard <= self._bus.timeouts.heartbeat
-        few = node.missed * self._bus.cycle < self._bus.timeouts.tpdo
-        return node.is_configured and recent and few and node.nmt == OPERATIONAL
 
     # The link.
 

@@ -88,6 +88,11 @@ class DriveClient(NodeClient):
         self.is_homed = False
         self.is_homing = False
 
+    def is_sound(self, now: float) -> bool:
+        """See `NodeClient.is_sound`; its process data comes too."""
+        few = self.missed * self._cycle < self._timeouts.tpdo
+        return few and super().is_sound(now)
+
     @property
     def is_measured(self) -> bool:
         """Whether position and speed are those of the last SYNC, not of one before."""
