@@ -1,5 +1,6 @@
 """Fuses keyframes into one surface: weighted, counted, and cleared of ghosts."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -229,15 +230,24 @@ def _join_layers(
 
 
 def _real(keys: IntArray, sums: FloatArray) -> BoolArray:
-    """Finds voxels with enough pixels and frames compared with their column's best."""
+    """Finds voxels with enough pixels and frames, as in `VoxelMap.surface_map`.
+
+    Enough is a share of what the best voxel of the 3 x 3 columns round it got: a flying
+    pixel is not seen again when the camera has moved, a surface is.
+    """
     if not keys.size:
         return np.zeros(0, dtype=np.bool_)
-    column = keys // (2 * _REACH)
-    first = np.flatnonzero(np.concatenate([[True], np.diff(column) > 0]))
-    index = np.repeat(np.arange(first.size), np.diff(np.append(first, keys.size)))
+    columns, index = np.unique(keys // (2 * _REACH), return_inverse=True)
     real = sums[8] >= _MIN_COUNT
     for row in (8, 9):
-        real &= sums[row] >= _GHOST_SHARE * np.maximum.reduceat(sums[row], first)[index]
+        own = np.zeros(columns.size)
+        np.maximum.at(own, index, sums[row])
+        best = own.copy()
+        for i, j in itertools.product((-1, 0, 1), repeat=2):
+            beside = columns + i * 2 * _REACH + j
+            place = np.minimum(np.searchsorted(columns, beside), columns.size - 1)
+            best = np.maximum(best, np.where(columns[place] == beside, own[place], 0.0))
+        real &= sums[row] >= _GHOST_SHARE * best[index]
     return np.asarray(real)
 
 

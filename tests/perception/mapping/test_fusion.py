@@ -6,8 +6,8 @@ from pydrake.math import RigidTransform
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import Frame
 from perception.mapping.fusion import fuse, write_map, write_mesh, write_voxels
-from perception.mapping.keyframe import make_keyframe
-from perception.mapping.view import Features
+from perception.mapping.keyframe import make_keyframe, mean_depth
+from perception.mapping.view import Features, ThinPicture, View
 
 # Nine pixels a voxel at 0.7 m: the test's camera has a pixel every 3.1 mm.
 CONFIG = MapperConfig(stride=2, cell=0.02)
@@ -54,6 +54,31 @@ def test_what_was_there_once_is_erased_by_later_frames(intrinsics):
     assert fused.p_WQs[2].min() > 0.69
     kept = fused_of(intrinsics, [ghost] * 4)  # What is always there stays.
     assert kept.p_WQs[2].min() < 0.51
+
+
+def test_what_one_frame_of_ten_saw_beside_a_surface_is_a_ghost(intrinsics):
+    hole, ghost = flat(intrinsics, 700), flat(intrinsics, 700)
+    # A voxel is 7 pixels wide; nothing else is seen where the ghost is.
+    hole[100:107, 200:207], ghost[100:107, 200:207] = 0, 685
+    with_hole, with_ghost = (
+        keyframe_of(intrinsics, 0, picture).replace(source=all_of(picture))
+        for picture in (hole, ghost)
+    )
+
+    def nearest(count):
+        keyframes = [with_ghost] * count + [with_hole] * (10 - count)
+        poses = [RigidTransform()] * 10
+        return fuse(keyframes, poses, X_WV, intrinsics, CONFIG).p_WQs[2].min()
+
+    assert nearest(1) > 0.695
+    assert nearest(2) < 0.69  # A fifth of them is enough.
+
+
+def all_of(picture):
+    """A view of all pixels, also those that lie by a step."""
+    depth_mm = picture.astype(np.uint16)
+    thin = ThinPicture.of(depth_mm, depth_mm > 0, CONFIG.stride)
+    return View(mean_depth(depth_mm, depth_mm > 0), NOTHING, thin)
 
 
 def test_a_step_stays_two_surfaces(intrinsics):
