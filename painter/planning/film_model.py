@@ -264,7 +264,7 @@ class FilmModel:
         edges = (np.append(columns, columns[-1] + 1) - site.border) * cell - x_line
         share = self._shares(drop, edges, standoff, reach)
         share *= self._dose / cell
-        landed = share[:, first - columns[0] : end - columns[0]]
+        landed = _between(share, middle - reach, first, end)
         if rows.size > 1:
             landed = landed[np.cumsum(new) - 1]
         shape = (high - low, end - first)
@@ -288,26 +288,24 @@ class FilmModel:
         """Makes a line that goes across as it goes up: each row has its own columns."""
         site, cell = self.site, self.site.cell
         count = site.wanted.shape[1]
-        rows = np.arange(low, high)
-        axis = (x_line + lean * site.y[rows])[:, None]
+        axis = (x_line + lean * site.y[low:high])[:, None]
         middle = np.floor(axis / cell).astype(int) + site.border
         columns = middle + np.arange(-reach, reach + 1)
-        height = site.height[
-            rows[:, None], np.minimum(np.maximum(columns, 0), count - 1)
-        ]
+        inside = np.minimum(np.maximum(columns, 0), count - 1)
+        height = np.take_along_axis(site.height[low:high], inside, axis=1)
         edges = (columns[:, :1] - site.border) * cell - axis
         edges = edges + cell * np.arange(2 * reach + 2)
         share = self._shares(standoff - height, edges, standoff, reach)
         # Leaning, a metre of the stroke is less than a metre up.
         share *= math.hypot(1.0, lean) * self._dose / cell
 
-        ends = int(middle[0, 0]), int(middle[-1, 0])
-        first = min(max(min(ends) - reach, 0), count - 1)
-        end = min(max(max(ends) + reach, first) + 1, count)
-        film = np.zeros((rows.size, end - first))
-        inside = (columns >= first) & (columns < end)
-        row, _ = np.nonzero(inside)
-        film[row, columns[inside] - first] = share[inside]
+        leftmost, rightmost = sorted((int(middle[0, 0]), int(middle[-1, 0])))
+        first = min(max(leftmost - reach, 0), count - 1)
+        end = min(max(rightmost + reach, first) + 1, count)
+        begin = leftmost - reach
+        film = np.zeros((high - low, rightmost + reach + 1 - begin))
+        np.put_along_axis(film, columns - begin, share, axis=1)
+        film = _between(film, begin, first, end)
         thickness = self._thickness(site.x[first:end] - axis, standoff)
         return Line((first, end), low, film, thickness)
 
@@ -352,3 +350,12 @@ class FilmModel:
         share[..., 0] = flow[..., 0] - 0.5
         share[..., 1:] = flow[..., 1:] - flow[..., :-1]
         return np.asarray(share)
+
+
+def _between(share: FloatArray, begin: int, first: int, end: int) -> FloatArray:
+    """Returns the columns from `first` up to `end` of shares that start at `begin`."""
+    film = np.zeros((len(share), end - first))
+    left, right = max(begin, first), min(begin + share.shape[1], end)
+    if left < right:
+        film[:, left - first : right - first] = share[:, left - begin : right - begin]
+    return film

@@ -140,6 +140,12 @@ def test_a_line_is_the_same_on_some_rows_as_on_all():
         np.testing.assert_array_equal(some.thickness[some.own(rows)], cut)
 
 
+@pytest.mark.parametrize("lean", [0.0, 0.1])
+@pytest.mark.parametrize("x_line", [-1.0, 3.0])
+def test_a_line_beside_the_site_leaves_nothing_on_it(x_line, lean):
+    assert not model(wall()).line(x_line, 0.3, lean).film.any()
+
+
 def test_a_leaning_stick_is_cut_in_along_its_sides():
     """A stick 4 cm wide and high that goes 1 to the right for 5 up.
 
