@@ -191,22 +191,22 @@ class ArmKinematics(FrozenValue):
         return jacobian
 
     def travel(self, q: FloatArray) -> FloatArray:
-        """Bounds how far any point of the arm's axes moves from row to row.
+        """Returns how far the arm's axes move from row to row, nozzle and camera too.
 
-        A turn moves what lies beyond it by no more than its length; links that tilt by
-        as much as others tilt back do not move what lies beyond them.
+        Of a straight link no point moves farther than the end that moves farther: each
+        is the same mean of both ends before and after.
 
         Args:
             q: (n, 5) rad.
 
         Returns:
-            (n - 1,) m.
+            (n - 1,) m, straight from one place to the next.
         """
-        tool = float(np.linalg.norm(self.X_LG.translation()))
-        tilts = np.cumsum(q[:, 1:4], axis=1)
-        turns = np.abs(np.diff(np.column_stack([q[:, 0], tilts, q[:, 4]]), axis=0))
-        lengths = [self.upper_arm + self.forearm + tool, self.upper_arm, self.forearm]
-        return np.asarray(turns @ np.array([*lengths, tool, tool]))
+        _, p_WE, p_WL = self._joint_points(np.asarray(q, dtype=float))
+        _, p_WG = self.gun_poses(q)
+        _, p_WC = self.camera_poses(q)
+        moved = np.diff(np.stack([p_WE, p_WL, p_WG, p_WC]), axis=1)
+        return np.asarray(np.sqrt((moved**2).sum(axis=2)).max(axis=0))
 
     def _joint_points(self, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Shoulder, elbow and wrist centre in W, each (n, 3)."""

@@ -142,22 +142,30 @@ def test_a_branch_is_plus_or_minus_one():
         ARM.solve(np.zeros((1, 3)), np.array([1.0, 0.0, 0.0]), elbow=0)
 
 
-def test_travel_bounds_how_far_elbow_wrist_and_nozzle_move():
+def test_travel_is_that_of_the_point_of_the_axes_that_moves_farthest():
     rng = np.random.default_rng(8)
     start = random_positions(200)
     q = np.stack([start, start + rng.normal(0.0, 0.05, start.shape)], axis=1)
-    bound = np.array([ARM.travel(pair)[0] for pair in q])
-    for points in (lambda q: ARM.gun_poses(q)[1], lambda q: ARM.forward(q)[1]):
-        moved = np.linalg.norm(points(q[:, 1]) - points(q[:, 0]), axis=1)
-        assert (moved <= bound + 1e-12).all()
-    # One joint alone, stretched out: the arc, a hair longer than its chord.
+    travel = np.array([ARM.travel(pair)[0] for pair in q])
+    # Points all along the forearm and the tool, and camera and elbow.
+    p_WLs = ARM.forward(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
+    p_WGs = ARM.gun_poses(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
+    p_WCs = ARM.camera_poses(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
+    p_WEs = ARM._joint_points(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
+    farthest = np.zeros(200)
+    for a, b in ((p_WEs, p_WLs), (p_WLs, p_WGs), (p_WLs, p_WCs)):
+        for share in np.linspace(0.0, 1.0, 11):
+            moved = np.diff((1.0 - share) * a + share * b, axis=1)[:, 0]
+            farthest = np.maximum(farthest, np.linalg.norm(moved, axis=1))
+    np.testing.assert_allclose(travel, farthest, atol=1e-12)
+    # One joint alone, stretched out: a chord.
     turned = np.array([np.zeros(5), [0.01, 0.0, 0.0, 0.0, 0.0]])
-    assert ARM.travel(turned) == pytest.approx([1.8 * 0.01])
+    assert ARM.travel(turned) == pytest.approx([2.0 * 1.8 * np.sin(0.005)])
 
 
 def test_shoulder_and_elbow_that_tilt_against_one_another_leave_the_forearm_level():
     q = np.array([np.zeros(5), [0.0, 0.02, -0.02, 0.0, 0.0]])
-    assert ARM.travel(q) == pytest.approx([0.7 * 0.02])
+    assert ARM.travel(q) == pytest.approx([2.0 * 0.7 * np.sin(0.01)])
 
 
 def test_limits_hold_at_the_bounds_and_never_for_nan():
