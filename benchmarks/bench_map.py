@@ -50,7 +50,10 @@ CELL = 0.01
 DOUBLED = 0.008
 """A 2 cm cell is doubled, m: where truth has one surface, if two points lie so far
 apart along its normal; where truth has more (a true step crosses the cell or lies
-within STEP of it), if a point lies so far from each of them."""
+within STEP of it), if a point lies so far from each of them. Only the square that was
+scanned counts; beside it a point rests on three pixels."""
+SPAN = 2.0
+"""Of that square, m."""
 STEP = 0.01
 """What a mount's error of 3 mm and 0.3 deg moves along the wall, with 3 mm to spare."""
 
@@ -216,7 +219,9 @@ def print_surface(result: MappingResult, wall: WallKind, X_TW: RigidTransform) -
     np.maximum.at(high, index, z)
     np.minimum.at(low, index, z)
     middle_V = np.vstack([0.02 * (cells + 0.5), np.zeros(cells.shape[1])])
-    step = on_step((X_TW @ fused.X_WV @ middle_V)[:2], wall)
+    middle_T = (X_TW @ fused.X_WV @ middle_V)[:2]
+    scanned = np.all((middle_T > 0.0) & (middle_T < SPAN), axis=0)
+    one = scanned & ~on_step(middle_T, wall)
     doubled = high - low > DOUBLED
     by_step, away = strays(X_TW @ fused.p_WQs, wall)
     # A quadric through the wall: how far it leaves its plane over 2 m.
@@ -224,7 +229,7 @@ def print_surface(result: MappingResult, wall: WallKind, X_TW: RigidTransform) -
     quadric = np.linalg.lstsq(terms, z, rcond=None)[0]
     bend = terms[:, :3] @ quadric[:3]
     within = (np.abs(x) < 1.0) & (np.abs(y) < 1.0)
-    flat = f"{np.count_nonzero(doubled[~step])} of {np.count_nonzero(~step)}"
+    flat = f"{np.count_nonzero(doubled[one])} of {np.count_nonzero(one)}"
     bent = 1e3 * np.ptp(bend[within])
     print(
         f"  wall at 1 cm cells: 5-95 % {1e3 * thick:.2f} mm; doubled 2 cm cells "

@@ -20,7 +20,8 @@ _REACH = 1 << 20
 _BATCH = 8
 """Keyframes whose voxels are added to the map at once."""
 _MIN_COUNT = 3
-_GHOST_SHARE = 0.15
+_GHOST_SHARE = 0.2
+"""Voxels with less than this share of the best one beside them are no surface."""
 _SEEN_THROUGH = 0.02
 """A point is seen through by depth that lies so much farther, m and share of it."""
 _CARVERS = 3

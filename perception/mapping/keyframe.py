@@ -18,6 +18,8 @@ from perception.values import BoolArray, FloatArray, FrozenValue
 
 BLOCK = 8
 """Pixels of a grid point's edge: the noise of its mean is a third of a pixel's."""
+_SAMPLED = 16
+"""Every so many-th block stands for all where two views are compared."""
 _FILLED = 0.75
 """Share of a block's pixels that must be usable."""
 _STEP = 0.02
@@ -79,6 +81,7 @@ class Keyframe(FrozenValue):
         time: s.
         X_arm: Pose that the arm gave; None = unknown.
         planes: Largest first.
+        sample: (3, n) float32, m, in C, some of its mean points; see `sample_of`.
         source: Of all that takes memory.
     """
 
@@ -86,6 +89,7 @@ class Keyframe(FrozenValue):
     time: float
     X_arm: RigidTransform | None
     planes: tuple[PlaneSight, ...]
+    sample: npt.NDArray[np.float32]
     source: ViewSource
 
     @property
@@ -106,13 +110,6 @@ class Keyframe(FrozenValue):
     def grid(self, intrinsics: CameraIntrinsics) -> PointGrid:
         """Returns its mean points with their normals."""
         return grid_of(self.z, intrinsics)
-
-    def points(self, intrinsics: CameraIntrinsics, step: int) -> FloatArray:
-        """Returns every `step`-th of its mean points, (3, n), m, in C."""
-        z = self.z
-        row, column = np.nonzero(z)
-        row, column = row[::step], column[::step]
-        return _on_rays(row, column, z[row, column].astype(float), intrinsics)
 
 
 def make_keyframe(
@@ -139,6 +136,7 @@ def make_keyframe(
         time=frame.time,
         X_arm=frame.X_WC,
         planes=tuple(see_planes(grid_of(z, intrinsics), config, number)),
+        sample=sample_of(z, intrinsics),
         source=View(z, features, picture),
     )
 
@@ -175,6 +173,20 @@ def grid_of(z: npt.NDArray[np.float32], intrinsics: CameraIntrinsics) -> PointGr
     points = np.moveaxis(_on_rays(row, column, z.astype(float), intrinsics), 0, 2)
     valid = z > 0
     return PointGrid(points, _normals(points, valid), valid)
+
+
+def sample_of(
+    z: npt.NDArray[np.float32], intrinsics: CameraIntrinsics
+) -> npt.NDArray[np.float32]:
+    """Returns every `_SAMPLED`-th mean point, (3, n) float32, m, in C.
+
+    Args:
+        z: (h, w) float32, m, 0 = none; see `mean_depth`.
+        intrinsics: Of the camera.
+    """
+    row, column = (index[::_SAMPLED] for index in np.nonzero(z))
+    points = _on_rays(row, column, z[row, column].astype(float), intrinsics)
+    return points.astype(np.float32)
 
 
 def _on_rays(

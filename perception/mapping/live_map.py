@@ -11,7 +11,13 @@ from perception.config import MapConfig
 from perception.depth import CameraIntrinsics, backproject, usable_pixels
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.frames import DepthImage
-from perception.mapping.keyframe import Keyframe, grid_of, mean_depth, see_planes
+from perception.mapping.keyframe import (
+    Keyframe,
+    grid_of,
+    mean_depth,
+    sample_of,
+    see_planes,
+)
 from perception.mapping.keyframe_graph import KeyframeGraph, Solution
 from perception.mapping.view import ThinPicture, View
 from perception.values import BoolArray, FrozenValue, SurfaceMap
@@ -130,7 +136,7 @@ class LiveMap(FrozenValue):
         squares = []
         for k in sorted({picture.keyframe for picture in self.pictures}):
             X_CfC = self._X_WCf(k).inverse() @ self.solution.graph.poses[k]
-            points = self.graph.keyframes[k].points(self.graph.intrinsics, step=16)
+            points = self.graph.keyframes[k].sample.astype(float)
             if points.size:
                 away = X_CfC @ points - points
                 squares.append(np.mean(np.sum(away**2, axis=0)))
@@ -171,7 +177,8 @@ class LiveMap(FrozenValue):
         number = len(graph.keyframes)
         z = mean_depth(depth_mm, usable)
         planes = see_planes(grid_of(z, graph.intrinsics), graph.config, number)
-        keyframe = Keyframe(number, time, X_arm, tuple(planes), View(z))
+        sample = sample_of(z, graph.intrinsics)
+        keyframe = Keyframe(number, time, X_arm, tuple(planes), sample, View(z))
         return graph.extended(keyframe, X_arm @ self.X_CCm)
 
     def _fused_again(self) -> VoxelMap:

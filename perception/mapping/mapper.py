@@ -65,14 +65,14 @@ class Mapper:
     While frames come, time and memory are bounded by `MapperConfig.working_set` (w):
 
     - at most w keyframes have corners, depths and pixels in memory, those that were
-      made or overlapped last; the others wait in a file and come back at need;
+      made or registered last; the others wait in a file and come back at need;
     - every `optimize_every` keyframes these w are solved for, with at most w times
       `max_links` links; all else is held where it is (see `KeyframeGraph.settled`).
 
-    What grows is small: poses, planes and links stay, some 6 kB a keyframe, and so does
-    a pose of each frame; finding the nearest keyframes takes 1 us for each there is.
-    Only `finish` solves for all keyframes, and fuses them one after the other: it is
-    for the end, or for later from the session's file.
+    What grows is small: poses, planes, links and sampled points stay, some 12 kB a
+    keyframe, and so does a pose of each frame; finding the nearest keyframes takes
+    1 us for each there is. Only `finish` solves for all keyframes, and fuses them one
+    after the other: it is for the end, or for later from the session's file.
 
     Attributes:
         config: Settings; not to be changed.

@@ -37,10 +37,9 @@ def overlap(
         X_CK: Its pose, seen from the camera at the other one.
         intrinsics: Of the camera.
     """
-    points = keyframe.points(intrinsics, step=16)
-    if not points.size:
+    if not keyframe.sample.size:
         return 0.0
-    x, y, z = X_CK @ points
+    x, y, z = X_CK @ keyframe.sample.astype(float)
     z = np.maximum(z, 1e-3)
     u = intrinsics.fx * x / z + intrinsics.cx
     v = intrinsics.fy * y / z + intrinsics.cy

@@ -71,7 +71,7 @@ def test_what_one_frame_of_ten_saw_beside_a_surface_is_a_ghost(intrinsics):
         return fuse(keyframes, poses, X_WV, intrinsics, CONFIG).p_WQs[2].min()
 
     assert nearest(1) > 0.695
-    assert nearest(2) < 0.69  # A fifth of them is enough.
+    assert nearest(3) < 0.69  # A fifth of them is enough.
 
 
 def all_of(picture):
