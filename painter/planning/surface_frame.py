@@ -45,6 +45,8 @@ class SurfaceFrame(FrozenValue):
     def of_wall(cls, segmentation: WallSegmentation) -> "SurfaceFrame | None":
         """Makes the surface that the gun is to follow on a wall.
 
+        Asked for the same wall again it returns the same surface.
+
         Args:
             segmentation: Of the tile.
 
@@ -52,15 +54,7 @@ class SurfaceFrame(FrozenValue):
             The surface; None if none is known, or if the wall is flat within 5 mm and
             1 degree.
         """
-        if segmentation.surface is None or segmentation.normals is None:
-            return None
-        height = np.asarray(segmentation.surface, dtype=np.float64)
-        least = float(np.asarray(segmentation.normals)[..., 2].min())
-        if np.abs(height).max() <= _FLAT_HEIGHT and least >= np.cos(
-            np.deg2rad(_FLAT_DEG)
-        ):
-            return None
-        return cls.smoothed(height, segmentation.cell)
+        return _surface_of(segmentation)
 
     @classmethod
     def smoothed(cls, height: FloatArray, cell: float) -> "SurfaceFrame":
@@ -134,6 +128,18 @@ class SurfaceFrame(FrozenValue):
             np.clip(x, self.x[0], self.x[-1]),
             np.clip(y, self.y[0], self.y[-1]),
         )
+
+
+@functools.lru_cache(maxsize=1)
+def _surface_of(segmentation: WallSegmentation) -> SurfaceFrame | None:
+    """See `SurfaceFrame.of_wall`; a planner asks three times for one wall."""
+    if segmentation.surface is None or segmentation.normals is None:
+        return None
+    height = np.asarray(segmentation.surface, dtype=np.float64)
+    least = float(np.asarray(segmentation.normals)[..., 2].min())
+    if np.abs(height).max() <= _FLAT_HEIGHT and least >= np.cos(np.deg2rad(_FLAT_DEG)):
+        return None
+    return SurfaceFrame.smoothed(height, segmentation.cell)
 
 
 def above_wall(segmentation: WallSegmentation) -> FloatArray:

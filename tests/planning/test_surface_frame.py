@@ -171,6 +171,13 @@ def test_surface_goes_on_beyond_the_tile(make_shape):
     )
 
 
+def test_a_surface_is_made_once_for_a_wall(make_shape):
+    wall, other = make_shape(tilted_half), make_shape(bulged)
+    first = SurfaceFrame.of_wall(wall)
+    assert SurfaceFrame.of_wall(wall) is first
+    assert SurfaceFrame.of_wall(other) is not first
+
+
 def test_flat_wall_gives_the_same_program(robot, make_wall, make_shape):
     almost = make_shape(lambda x, y: 0.004 * (x - 1.0) + 0.0 * y)
     assert SurfaceFrame.of_wall(make_wall()) is None
