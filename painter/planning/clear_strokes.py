@@ -15,7 +15,7 @@ _STEP = 0.03  # m along a stroke, between the places that are looked at.
 # the room in which the arm stops and turns at 0.6 m/s.
 _STOPPING = 0.12
 # m beyond a stroke's end and away from the wall: where the arm stops, and on the way.
-_RUN_OUT = ((0.10, 0.03), (0.05, 0.01))
+RUN_OUT = ((0.10, 0.03), (0.05, 0.01))
 _SLOWER = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)  # Shares of a stroke's speed, in turn.
 _TOO_BENT = "the wall's surface bends too sharply for the joints at this speed"
 # Share of the strokes' length; if more is out of reach the arm stands in the wrong
@@ -104,7 +104,7 @@ def has_run_out(strokes: Sequence[Stroke], linker: Linker) -> BoolArray:
         [
             np.append(stroke.end_T + beyond * ahead, stroke.standoff + out)
             for stroke, ahead in zip(strokes, along, strict=True)
-            for beyond, out in _RUN_OUT
+            for beyond, out in RUN_OUT
         ]
     )
     q = linker.gun.solve(p_TGs)

@@ -9,6 +9,7 @@ from pydrake.planning import CollisionChecker
 from painter.errors import CollisionError, InputError, ReachError
 from painter.planning.blend import MovingState
 from painter.planning.clear_strokes import (
+    RUN_OUT,
     clear_strokes,
     has_run_out,
     nozzle_points,
@@ -32,6 +33,7 @@ from painter.planning.spray_path import PaintProgram, SkippedStroke, Stroke
 from painter.planning.stroke_order import order_strokes
 from painter.planning.surface_frame import SurfaceFrame, above_wall
 from painter.planning.tile import cell_centres
+from painter.planning.tool_shape import standoffs_beside, tool_boxes
 from painter.planning.touch_up import touch_up_strokes
 from painter.planning.verify import verify_motion, verify_strokes
 from painter.planning.zones import in_zones
@@ -189,17 +191,29 @@ class ProgramPlanner(FrozenValue):
         return SquareGun(self.kinematics, segmentation.X_WT, surface)
 
     def _nearest(self, segmentation: WallSegmentation) -> FloatArray:
-        """Returns the least stand-offs on a tile, as `Site` has them."""
+        """Returns the least stand-offs on a tile, by reach and by what stands out."""
         cell = segmentation.cell
         border = margin_cells(cell)
         ny, nx = (size + 2 * border for size in segmentation.wall_mask.shape)
-        return nearest_standoffs(
-            *cell_centres((ny, nx), cell, margin=border * cell),
+        x, y = cell_centres((ny, nx), cell, margin=border * cell)
+        reached = nearest_standoffs(
+            x,
+            y,
             gun=self._gun(segmentation),
             limits=self.limits,
             near=self.raster.cut_in_standoff,
             far=self.raster.standoff,
         )
+        _, *obstacles = segmentation_boxes(segmentation)  # The first is the wall.
+        clear = standoffs_beside(
+            x,
+            y,
+            obstacles=obstacles,
+            tool=tool_boxes(self.checker),
+            clearance=self.motion.clearance,
+            run_out=RUN_OUT,
+        )
+        return np.maximum(reached, clear)
 
 
 def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke, ...]:
