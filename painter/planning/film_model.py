@@ -171,7 +171,7 @@ class FilmModel:
             high: Where it ends or begins, m in T y.
             standoff: From which it is sprayed, m.
         """
-        b = self._spread * standoff
+        b = self._spread * (standoff - self.site.deepest)
         return slice(self.site.row(low - b), self.site.row(high + b) + 1)
 
     def line(
@@ -268,7 +268,10 @@ class FilmModel:
         if rows.size > 1:
             landed = landed[np.cumsum(new) - 1]
         shape = (high - low, end - first)
-        thickness = self._thickness(site.x[first:end] - x_line, standoff)
+        drop = standoff - np.minimum(site.height[low + rows, first:end], 0.0)
+        thickness = self._thickness(site.x[first:end] - x_line, drop)
+        if rows.size > 1:
+            thickness = thickness[np.cumsum(new) - 1]
         return Line(
             (first, end),
             low,
@@ -306,13 +309,21 @@ class FilmModel:
         film = np.zeros((high - low, rightmost + reach + 1 - begin))
         np.put_along_axis(film, columns - begin, share, axis=1)
         film = _between(film, begin, first, end)
-        thickness = self._thickness(site.x[first:end] - axis, standoff)
+        drop = standoff - np.minimum(site.height[low:high, first:end], 0.0)
+        thickness = self._thickness(site.x[first:end] - axis, drop)
         return Line((first, end), low, film, thickness)
 
-    def _thickness(self, offset: FloatArray, standoff: float) -> FloatArray:
-        """Returns half the fan's thickness, m, over places off its axis, m."""
-        a, b = half_axes(self._tip, standoff)
-        return np.asarray(b * np.sqrt(np.maximum(1.0 - (offset / a) ** 2, 1e-4)))
+    def _thickness(self, offset: FloatArray, drop: FloatArray) -> FloatArray:
+        """Returns half the fan's thickness, m, on cells.
+
+        Args:
+            offset: Of the cells from the fan's axis, m.
+            drop: Nozzle over each, m: the farther, the thicker the fan. What stands
+                out counts as the wall: its sides catch what would pass it.
+        """
+        a, b = half_axes(self._tip, 1.0)
+        off = offset / (a * drop)
+        return np.asarray(b * drop * np.sqrt(np.maximum(1.0 - off**2, 1e-4)))
 
     def _shares(
         self, drop: FloatArray, edges: FloatArray, standoff: float, reach: int

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
+from scipy.special import betainc
 
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.cut_in import _switch
@@ -370,3 +371,26 @@ def test_spans_of_nearly_one_line_are_joined_only_where_they_meet():
         [upper, lower._replace(high=1.825)], tip=TIP, raster=RASTER
     )
     assert joined.length == pytest.approx(2.01)
+
+
+def test_a_recess_catches_the_end_of_a_stroke_farther_out():
+    depth, standoff, end = 0.10, RASTER.standoff, 0.5
+    mask = np.zeros((100, 60), dtype=bool)
+    mask[:, 0] = True
+    site = Site.of_tile(mask, CELL, np.full(mask.shape, -depth))
+    dut = FilmModel(site, tip=TIP, speed=RASTER.speed, nominal=1e-4)
+    line = dut.line(0.305, standoff)
+    share = 1.0 - dut.below(line, slice(0, len(site.y)), end)
+    # Under the axis the fan is as thick as it has become on its longer way.
+    _, b = half_axes(TIP, standoff + depth)
+    passed = betainc(
+        TIP.beta2, TIP.beta2, 0.5 + 0.5 * np.clip((end - site.y) / b, -1, 1)
+    )
+    column = site.border + 30 - line.columns[0]
+    np.testing.assert_allclose(
+        share[site.border : -site.border, column],
+        passed[site.border : -site.border],
+        atol=2e-3,
+    )
+    rows = dut.rows(end, end, standoff)
+    assert site.y[rows.stop - 1] >= end + b - CELL
