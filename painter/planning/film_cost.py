@@ -15,7 +15,9 @@ class _Weights(NamedTuple):
     Attributes:
         uneven: A cell whose film is off by all of nominal.
         spilt: A cell's worth of paint that lands off the wall.
-        soiled: All that stays clean soiled, as share of all wall bare.
+        soiled: All that stays clean soiled, as share of all wall bare, where there is
+            as much of the one as of the other.
+        rarity: Power of wall over what stays clean by which one soiled cell counts.
         bare: Film at which a cell begins to count as bare, and does so in full.
         dirty: Film at which a cell that stays clean begins to count as soiled, and
             does so in full.
@@ -24,6 +26,7 @@ class _Weights(NamedTuple):
     uneven: float
     spilt: float
     soiled: float
+    rarity: float
     bare: tuple[float, float]
     dirty: tuple[float, float]
 
@@ -32,10 +35,10 @@ class _Weights(NamedTuple):
 # bounds. Beside openings the film can be even up to the edge, and evenness is what is
 # hard to get. Where things stand out their shade is uneven at any price, and what
 # evenness would cost is better spent on coverage.
-_OPENINGS = _Weights(10.0, 1.6, 1.6, (0.95, 0.72), (0.06, 0.12))
-_THINGS = _Weights(1.0, 0.4, 0.4, (0.88, 0.76), (0.05, 0.13))
-_BARE_WALL = _Weights(1.5, 0.9, 0.8, (0.88, 0.76), (0.05, 0.13))
-_SOILED_MOST = 13.0  # That one soiled cell counts.
+_OPENINGS = _Weights(10.0, 1.8, 1.2, 2.0, (0.95, 0.72), (0.06, 0.12))
+_THINGS = _Weights(1.0, 0.4, 0.5, 1.0, (0.88, 0.76), (0.05, 0.13))
+_BARE_WALL = _Weights(1.5, 0.9, 0.8, 1.0, (0.88, 0.76), (0.05, 0.13))
+_SOILED_MOST = 15.0  # That one soiled cell counts.
 _BEGUN = 0.002  # A stroke, m²: its turn and its valve ...
 _LENGTH = 0.001  # ... and a metre of it, m²: both cost time.
 
@@ -80,7 +83,7 @@ class FilmCost(FrozenValue):
             weights.spilt,
             weights.bare,
             weights.dirty,
-            min(weights.soiled * ratio, _SOILED_MOST),
+            min(weights.soiled * ratio**weights.rarity, _SOILED_MOST),
         )
 
     def on(self, wanted: BoolArray, clean: BoolArray) -> "CellCosts":
