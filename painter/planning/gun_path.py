@@ -263,16 +263,20 @@ def fastest_tool_blend(
         The blend, or None if no duration up to 8 s keeps reach and limits; where none
         up to `longest` does, perhaps a longer one.
     """
+    few, heights = (_hop_height(samples.s, hop, rise) for samples in (_FEW, _SAMPLES))
 
     def allowed(durations: FloatArray) -> BoolArray:
-        keeps = kept(durations, _FEW, every=3)
-        keeps[keeps] = kept(durations[keeps], _SAMPLES, every=1)
+        keeps = kept(durations, _FEW, few, every=3)
+        if keeps.any():
+            keeps[keeps] = kept(durations[keeps], _SAMPLES, heights, every=1)
         return keeps
 
-    def kept(durations: FloatArray, samples: Shares, *, every: int) -> BoolArray:
+    def kept(
+        durations: FloatArray, samples: Shares, heights: FloatArray, *, every: int
+    ) -> BoolArray:
         """Looks at samples; at every third one if they come in threes."""
         p_TGs, _ = evaluate(start, end, durations, samples)
-        p_TGs[..., 2] += _hop_height(samples.s, hop, rise)
+        p_TGs[..., 2] += heights
         q = gun.solve(p_TGs)
         before, at, after = (
             q[:, first : first + q.shape[1] - 2 : every] for first in range(3)

@@ -265,9 +265,15 @@ class ArmKinematics(FrozenValue):
             q3 = elbow * np.arccos(np.where(np.abs(cos_elbow) <= 1, cos_elbow, np.nan))
         # Law of sines and cosines in one: the forearm seen from the upper arm's axis.
         q2 = np.arctan2(-z, x) - np.arctan2(b * np.sin(q3), a + b * np.cos(q3))
-        q = np.stack([yaw, q2, q3, pitch - q2 - q3, wrist_yaw], axis=-1)
+        q = np.empty((len(yaw), 5))
+        q[:, 0], q[:, 1], q[:, 2] = yaw, q2, q3
+        q[:, 3], q[:, 4] = pitch - q2 - q3, wrist_yaw
         q[~np.isfinite(q).all(axis=1)] = np.nan
-        wrapped: FloatArray = np.pi - np.mod(np.pi - q, 2.0 * np.pi)
+        below = np.pi - q
+        around = (below < 0.0) | (below >= 2.0 * np.pi)
+        # Few turn more than half way round, and the remainder of all takes its time.
+        below[around] = np.mod(below[around], 2.0 * np.pi)
+        wrapped: FloatArray = np.pi - below
         return wrapped
 
 
