@@ -75,11 +75,13 @@ class _Loss(NamedTuple):
         area: m²
         window: The cells that it would have changed.
         moved: By how much the film had changed there until then, m².
+        moved_in_all: And everywhere.
     """
 
     area: float
     window: _Window
     moved: float
+    moved_in_all: float
 
 
 class _Laid:
@@ -134,6 +136,7 @@ class FilmFit:
         # changed, all changes added up.
         self._costs: FloatArray = np.zeros(site.wanted.shape)
         self._moved: FloatArray = np.zeros(site.wanted.shape)
+        self._moved_in_all = 0.0  # The same of all cells, m².
 
     @property
     def spans(self) -> tuple[Span, ...]:
@@ -219,8 +222,10 @@ class FilmFit:
             return None
         if trial.high - trial.low < raster.min_stroke:
             return None
-        has_room = laid.has_room if name == "flow" else self._has_room(trial)
-        return trial if has_room else None
+        is_on_line = laid.has_room and name in ("flow", "low", "high")
+        if is_on_line and trial.low >= span.low and trial.high <= span.high:
+            return trial
+        return trial if self._has_room(trial) else None
 
     def _has_room(self, span: Span) -> bool:
         site = self._model.site
@@ -251,22 +256,24 @@ class FilmFit:
         if trial is None:
             laid.failed[step] = None
             return False
-        line, reached = self._reached(trial)
-        changed = _hull(laid.window, reached)
         name, size = step
-        if name in ("low", "high"):
-            # The film beyond the blur of the end that moves is as it was.
-            low, high = sorted((getattr(span, name), getattr(trial, name)))
-            rows = self._model.rows(low, high, span.standoff)
-            changed = _cut(changed, rows)
-        reached = _cut(reached, changed.rows)
-        film = self.film[changed].copy()
-        part = _part(film, changed, laid.window)
-        part -= _part(laid.film, laid.window, changed)
-        part = _part(film, changed, reached)
         if name == "flow":
-            part += laid.film * (trial.flow / span.flow)
+            changed = laid.window
+            film = self.film[changed] - laid.film
+            film += laid.film * (trial.flow / span.flow)
         else:
+            line, reached = self._reached(trial)
+            changed = _hull(laid.window, reached)
+            if name in ("low", "high"):
+                # The film beyond the blur of the end that moves is as it was.
+                low, high = sorted((getattr(span, name), getattr(trial, name)))
+                rows = self._model.rows(low, high, span.standoff)
+                changed = _cut(changed, rows)
+                reached = _cut(reached, rows)
+            film = self.film[changed].copy()
+            part = _part(film, changed, laid.window)
+            part -= _part(laid.film, laid.window, changed)
+            part = _part(film, changed, reached)
             part += self._film(trial, line, reached)
         costs = self._cell_costs(film, changed)
         gain = float((self._costs[changed] - costs).sum()) * self._model.site.cell**2
@@ -301,14 +308,19 @@ class FilmFit:
 
     def _change(self, window: _Window, film: FloatArray, costs: FloatArray) -> None:
         """Takes over a film and its costs on a window."""
-        self._moved[window] += np.abs(film - self.film[window])
+        moved = np.abs(film - self.film[window])
+        self._moved[window] += moved
+        self._moved_in_all += float(moved.sum()) * self._model.site.cell**2
         self.film[window], self._costs[window] = film, costs
 
     def _loss(self, area: float, window: _Window) -> _Loss:
-        return _Loss(area, window, self._moved_on(window))
+        return _Loss(area, window, self._moved_on(window), self._moved_in_all)
 
     def _still_loses(self, last: _Loss) -> bool:
         """Tells that the film has changed too little for a step to help now."""
+        moved = self._moved_in_all - last.moved_in_all
+        if last.area >= _LOSS_FOR_CHANGE * moved:
+            return True  # Not even if all of it was there, which is soon told.
         moved = self._moved_on(last.window) - last.moved
         return last.area >= _LOSS_FOR_CHANGE * moved
 
@@ -362,9 +374,8 @@ def _hull(a: _Window, b: _Window) -> _Window:
 def _cut(window: _Window, rows: slice) -> _Window:
     """Returns what of a window lies in some rows; it may be empty."""
     start = max(window.rows.start, rows.start)
-    return window._replace(
-        rows=slice(start, max(min(window.rows.stop, rows.stop), start))
-    )
+    stop = max(min(window.rows.stop, rows.stop), start)
+    return _Window(slice(start, stop), window.columns)
 
 
 def _part(film: FloatArray, window: _Window, other: _Window) -> FloatArray:

@@ -11,6 +11,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import betainc
@@ -18,7 +19,7 @@ from scipy.special import betainc
 from painter.planning.config import TipConfig
 from painter.planning.deposition import half_axes
 from painter.planning.spray_path import Stroke
-from perception.values import BoolArray, FloatArray, FrozenValue
+from perception.values import BoolArray, FloatArray, FrozenValue, IntArray
 
 # Beyond the tile's edges by so much the film is looked at, m: more than half a fan.
 MARGIN = 0.14
@@ -102,7 +103,10 @@ class Site(FrozenValue):
     def row(self, y: float) -> int:
         """Returns the row at `y`, m in T, or the end that it is beyond."""
         row = math.floor(y / self.cell) + self.border
-        return min(max(row, 0), len(self.height))
+        if row < 0:
+            return 0
+        count = len(self.height)
+        return row if row < count else count
 
     @functools.cached_property
     def x(self) -> FloatArray:
@@ -140,6 +144,50 @@ class Line(FrozenValue):
         return slice(rows.start - self.first_row, rows.stop - self.first_row)
 
 
+class _Ground(NamedTuple):
+    """What an upright line goes over: j different rows of the k that it was made on.
+
+    Attributes:
+        columns: First and end column of the window.
+        edges: (2 `reach` + 2,) columns, of which the fan's rays reach those between.
+        height: (j, 2 `reach` + 1) m, of these.
+        recess: (j, n) m, heights of the window that are below the wall, else 0.
+        which: (k,) of the j that each row is.
+    """
+
+    columns: tuple[int, int]
+    edges: IntArray
+    height: FloatArray
+    recess: FloatArray
+    which: IntArray
+
+    def on_rows(self, values: FloatArray) -> FloatArray:
+        """Returns (j, n) values on all k rows, (k, n)."""
+        if len(values) > 1:
+            return np.asarray(values[self.which])
+        return np.broadcast_to(values, (self.which.size, values.shape[1]))
+
+
+def _ground_under(site: Site, middle: int, reach: int, low: int, high: int) -> _Ground:
+    """Returns what lies under an upright line over a column, on rows of a site."""
+    count = site.wanted.shape[1]
+    first = min(max(middle - reach, 0), count - 1)
+    end = min(max(middle + reach, first) + 1, count)
+    # Rows that are as the one below them are looked at once.
+    new: BoolArray = np.array(site.steps[low:high, first:end].any(axis=1))
+    new[0] = True
+    rows = low + np.flatnonzero(new)
+    edges = np.arange(middle - reach, middle + reach + 2)
+    inside = np.minimum(np.maximum(edges[:-1], 0), count - 1)
+    return _Ground(
+        (first, end),
+        edges,
+        site.height[rows[:, None], inside],
+        np.minimum(site.height[rows, first:end], 0.0),
+        np.cumsum(new) - 1,
+    )
+
+
 class FilmModel:
     """Film on a site, by line, stroke and program; lines are made once."""
 
@@ -162,6 +210,7 @@ class FilmModel:
         self._cdf = betainc(tip.gamma + 1.0, tip.gamma + 1.0, 0.5 + 0.5 * _TABLE)
         self._across = betainc(tip.beta2, tip.beta2, 0.5 + 0.5 * _TABLE)
         self._lines: dict[tuple[float, float, float, int, int], Line] = {}
+        self._ground: dict[tuple[int, int, int, int], _Ground] = {}
 
     def rows(self, low: float, high: float, standoff: float) -> slice:
         """Returns the rows that a stroke's film reaches.
@@ -171,8 +220,9 @@ class FilmModel:
             high: Where it ends or begins, m in T y.
             standoff: From which it is sprayed, m.
         """
-        b = self._spread * (standoff - self.site.deepest)
-        return slice(self.site.row(low - b), self.site.row(high + b) + 1)
+        site = self.site
+        b = self._spread * (standoff - site.deepest)
+        return slice(site.row(low - b), site.row(high + b) + 1)
 
     def line(
         self,
@@ -250,33 +300,21 @@ class FilmModel:
     ) -> Line:
         """Makes a line that goes straight up: all rows have the same columns."""
         site, cell = self.site, self.site.cell
-        count = site.wanted.shape[1]
         middle = math.floor(x_line / cell) + site.border
-        first = min(max(middle - reach, 0), count - 1)
-        end = min(max(middle + reach, first) + 1, count)
-        # Rows that are as the one below them are looked at once.
-        new: BoolArray = np.array(site.steps[low:high, first:end].any(axis=1))
-        new[0] = True
-        rows = np.flatnonzero(new)
-        columns = np.arange(middle - reach, middle + reach + 1)
-        inside = np.minimum(np.maximum(columns, 0), count - 1)
-        drop = standoff - site.height[low + rows[:, None], inside]
-        edges = (np.append(columns, columns[-1] + 1) - site.border) * cell - x_line
-        share = self._shares(drop, edges, standoff, reach)
+        key = (middle, reach, low, high)
+        if key not in self._ground:
+            self._ground[key] = _ground_under(site, *key)
+        ground = self._ground[key]
+        first, end = ground.columns
+        edges = np.asarray((ground.edges - site.border) * cell - x_line)
+        share = self._shares(standoff - ground.height, edges, standoff, reach)
         share *= self._dose / cell
         landed = _between(share, middle - reach, first, end)
-        if rows.size > 1:
-            landed = landed[np.cumsum(new) - 1]
-        shape = (high - low, end - first)
-        drop = standoff - np.minimum(site.height[low + rows, first:end], 0.0)
-        thickness = self._thickness(site.x[first:end] - x_line, drop)
-        if rows.size > 1:
-            thickness = thickness[np.cumsum(new) - 1]
+        thickness = self._thickness(
+            site.x[first:end] - x_line, standoff - ground.recess
+        )
         return Line(
-            (first, end),
-            low,
-            np.broadcast_to(landed, shape),
-            np.broadcast_to(thickness, shape),
+            ground.columns, low, ground.on_rows(landed), ground.on_rows(thickness)
         )
 
     def _make_leaning(
@@ -341,26 +379,16 @@ class FilmModel:
         drop = np.maximum(drop, 1e-6)
         # The steepest ray that has landed by each column's far edge, on either side of
         # the axis; a column higher than the nozzle stops them all.
-        right = self._landed(edges[..., reach + 1 :], drop[:, reach:], standoff / a)
-        left = self._landed(-edges[..., reach::-1], drop[:, reach::-1], standoff / a)
+        steepest = np.empty((2, len(drop), reach + 1))
+        np.divide(edges[..., reach + 1 :], drop[:, reach:], out=steepest[0])
+        np.divide(-edges[..., reach::-1], drop[:, reach::-1], out=steepest[1])
+        np.maximum.accumulate(steepest, axis=-1, out=steepest)
+        steepest *= standoff / a
+        flow = np.interp(np.maximum(steepest, 0.0, out=steepest), _TABLE, self._cdf)
+        right, left = np.diff(flow, axis=-1, prepend=0.5)
         share = np.concatenate([left[:, :0:-1], right], axis=1)
         share[:, reach] += left[:, 0]
         return share
-
-    def _landed(self, far: FloatArray, drop: FloatArray, scale: float) -> FloatArray:
-        """Returns the flow's share on each column outwards from the spray axis.
-
-        Args:
-            far: (..., n) m, far edges of the columns.
-            drop: (..., n) m, nozzle over each column.
-            scale: From a ray's slope to the fan's coordinate u.
-        """
-        steepest = np.maximum.accumulate(far / drop, axis=-1) * scale
-        flow = np.interp(np.maximum(steepest, 0.0), _TABLE, self._cdf)
-        share = np.empty_like(flow)
-        share[..., 0] = flow[..., 0] - 0.5
-        share[..., 1:] = flow[..., 1:] - flow[..., :-1]
-        return np.asarray(share)
 
 
 def _between(share: FloatArray, begin: int, first: int, end: int) -> FloatArray:
