@@ -11,6 +11,7 @@ from pydrake.planning import CollisionChecker
 from scipy import ndimage
 
 from painter.errors import CollisionError
+from painter.planning.separation import Separation
 from perception.values import BoolArray, FloatArray, FrozenValue, WallSegmentation
 
 _MIN_HEIGHT = 0.01  # m; lower things are within the wall's own unevenness.
@@ -157,6 +158,8 @@ class ClearSpace:
                 X_WT @ X_TB,
             )
             assert added, box.name
+        self._checker.SetPaddingAllRobotEnvironmentPairs(floor_clearance)
+        self._separation = Separation(self._checker, X_WT)
 
     def free(self, q: FloatArray, *, slack: float = 0.0) -> BoolArray:
         """Tells which configurations keep clear.
@@ -168,11 +171,9 @@ class ClearSpace:
         Returns:
             (n,) bool.
         """
-        self._checker.SetPaddingAllRobotEnvironmentPairs(self._floor_clearance - slack)
-        answers = self._checker.CheckConfigsCollisionFree(
-            list(np.asarray(q, float)), Parallelism(False)
-        )
-        return np.array(answers, dtype=bool)
+        free = self._proven(q, slack)
+        free[~free] = self._checked(q[~free], slack)
+        return free
 
     def all_free(self, q: FloatArray) -> bool:
         """Returns whether all configurations q (n, 5) keep clear.
@@ -182,7 +183,22 @@ class ClearSpace:
         """
         few = np.zeros(len(q), dtype=bool)
         few[::_FEW] = True
-        return bool(self.free(q[few]).all()) and bool(self.free(q[~few]).all())
+        doubtful = ~self._proven(q)
+        return all(self._checked(q[doubtful & some]).all() for some in (few, ~few))
+
+    def _proven(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
+        """Tells which configurations plainly keep clear; see `free`."""
+        return self._separation.proven(q, self._floor_clearance - slack)
+
+    def _checked(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
+        """Tells which configurations keep clear, one by one; see `free`."""
+        if not len(q):
+            return np.zeros(0, dtype=bool)
+        self._checker.SetPaddingAllRobotEnvironmentPairs(self._floor_clearance - slack)
+        answers = self._checker.CheckConfigsCollisionFree(
+            list(np.asarray(q, float)), Parallelism(False)
+        )
+        return np.array(answers, dtype=bool)
 
     def worst_pair(self, q: FloatArray) -> str:
         """Names the two bodies at q (5,) that are nearest for what they should keep."""
@@ -210,11 +226,13 @@ class ClearSpace:
         Raises:
             CollisionError: Names time, bodies, what they lack and the clearance.
         """
-        for begin in range(0, len(q), _AT_A_TIME):
-            free = self.free(q[begin : begin + _AT_A_TIME], slack=slack)
+        doubtful = np.flatnonzero(~self._proven(q, slack))
+        for begin in range(0, len(doubtful), _AT_A_TIME):
+            rows = doubtful[begin : begin + _AT_A_TIME]
+            free = self._checked(q[rows], slack)
             if free.all():
                 continue
-            first = begin + int(np.argmin(free))
+            first = int(rows[np.argmin(free)])
             raise CollisionError(
                 f"{what}: {self.worst_pair(q[first])} at {time[first]:.2f} s; "
                 f"clearance is {1e3 * self.clearance:.0f} mm, "
