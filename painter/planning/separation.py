@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.geometry import Box, Cylinder, Role, Shape
 from pydrake.math import RigidTransform
 from pydrake.planning import CollisionChecker
@@ -20,6 +21,8 @@ from perception.values import BoolArray, FloatArray, FrozenValue, IntArray
 _MARGIN = 1e-4  # m, on every distance: far above the rounding of the checker's own.
 _NEAR = 2  # Joints between bodies of which each shape is looked at by itself.
 _AT_A_TIME = 64  # Configurations; the arrays of more do not stay in the cache.
+# Shadows are of single precision: at 10 m that is 1 um, nothing beside the margin.
+_Singles = npt.NDArray[np.floating[Any]]
 
 # How many joints move a body, the body (Drake's), and its shapes.
 _Part = tuple[int, Any, list["_Shape"]]
@@ -81,11 +84,11 @@ class Separation:
             key=lambda joint: int(joint.position_start()),
         )
         places = [joint.frame_on_parent().CalcPoseInWorld(context) for joint in joints]
-        self._points = [X_WJ.translation() for X_WJ in places]
-        self._crosses = [
-            np.cross(np.eye(3), X_WJ.rotation() @ joint.revolute_axis())
-            for joint, X_WJ in zip(joints, places, strict=True)
-        ]
+        # By Rodrigues a joint moves points by 1 + sin(q) A + (1 - cos(q)) A².
+        self._turns = np.zeros((len(joints), 4, 4))
+        for turn, joint, X_WJ in zip(self._turns, joints, places, strict=True):
+            turn[:3, :3] = np.cross(np.eye(3), X_WJ.rotation() @ joint.revolute_axis())
+            turn[:3, 3] = -turn[:3, :3] @ X_WJ.translation()
         moved = [
             set(plant.GetBodiesKinematicallyAffectedBy([joint.index()]))
             for joint in joints
@@ -102,8 +105,10 @@ class Separation:
         shapes = [shape for _, _, some in parts for shape in some]
         counts = [len(some) for _, _, some in parts]
         self._firsts = np.cumsum([0, *counts])
-        self._vectors = np.stack([shape.vectors for shape in shapes], axis=2)
-        self._radii = np.array([shape.radius for shape in shapes])
+        vectors = np.stack([shape.vectors for shape in shapes], axis=2)
+        self._vectors = np.concatenate([vectors, np.zeros_like(vectors[:1])])
+        self._vectors[3, 0] = 1.0  # Centres move as well, edges and axes but turn.
+        self._radii = np.array([shape.radius for shape in shapes], np.float32)
         links = np.array([link for link, _, _ in parts])
         # The shapes of each link are a row; those of the robot's foot come first.
         self._rows = np.searchsorted(np.repeat(links, counts), range(len(joints) + 2))
@@ -135,7 +140,8 @@ class Separation:
         for one, other in zip(self._one, self._other, strict=True):
             apart |= lows[one] - highs[other] >= self._required
             apart |= lows[other] - highs[one] >= self._required
-        clear = np.logical_or.reduceat(apart, self._tries, axis=0).all(axis=0)
+        near, far = np.split(apart, [self._near])
+        clear = near.reshape(-1, 3, len(q)).any(axis=1).all(axis=0) & far.all(axis=0)
         for first, around_low, around_high in self._around:
             beside = np.zeros((self._moving.size, around_low.shape[1], len(q)), bool)
             for axis in range(3):
@@ -145,43 +151,37 @@ class Separation:
             clear &= beside.all(axis=(0, 1))
         return np.asarray(clear)
 
-    def _shadows(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _shadows(self, q: FloatArray) -> tuple[_Singles, _Singles]:
         """Returns where shadows begin and end on axes, each (axes * parts, n), m.
 
         Axes are those of the links from the foot on, three each, and those of T; parts
         are shapes, and after them whole bodies.
         """
         count, size = len(q), self._radii.size
-        R, t = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
-        placed = np.empty((count, 3, 5, size))
-        axes = [R]
-        for link, row in enumerate(itertools.pairwise(self._rows)):
+        angle = q[:, :, None, None]
+        turns = np.eye(4) + np.sin(angle) * self._turns
+        turns += (1.0 - np.cos(angle)) * (self._turns @ self._turns)
+        placed = np.empty((count, 3, 5, size), np.float32)
+        axes = np.empty((count, len(self._rows), 3, 3), np.float32)
+        axes[:, -1] = self._R_WT.T
+        X = np.tile(np.eye(4), (count, 1, 1))
+        for link, (first, last) in enumerate(itertools.pairwise(self._rows)):
             if link:
-                angle = q[:, link - 1, None, None]
-                cross, point = self._crosses[link - 1], self._points[link - 1]
-                about = np.eye(3) + np.sin(angle) * cross
-                about += (1.0 - np.cos(angle)) * (cross @ cross)
-                t = t + (R @ (point - about @ point)[:, :, None])[:, :, 0]
-                R = R @ about
-                axes.append(R)
-            shapes = slice(*row)
-            vectors = self._vectors[:, :, shapes]
-            placed[..., shapes] = (R.reshape(-1, 3) @ vectors.reshape(3, -1)).reshape(
-                count, *vectors.shape
-            )
-            placed[:, :, 0, shapes] += t[:, :, None]
-        axes.append(np.broadcast_to(self._R_WT, R.shape))
-        along = np.concatenate(axes, axis=2).transpose(0, 2, 1)
+                X = X @ turns[:, link - 1]
+            axes[:, link] = X[:, :3, :3].transpose(0, 2, 1)
+            placed[..., first:last] = (
+                X[:, :3].reshape(-1, 4) @ self._vectors[..., first:last].reshape(4, -1)
+            ).reshape(count, 3, 5, -1)
+        along = axes.reshape(count, -1, 3)
         shadows = (along @ placed.reshape(count, 3, -1)).reshape(count, -1, 5, size)
         middle, half = _spans(shadows, self._radii)
         # Rows of many configurations are quicker to pick than columns.
-        low, high = (
-            np.ascontiguousarray(ends.transpose(1, 2, 0))
-            for ends in (middle - half, middle + half)
-        )
-        firsts = self._firsts[:-1]
-        low = np.concatenate([low, np.minimum.reduceat(low, firsts, axis=1)], axis=1)
-        high = np.concatenate([high, np.maximum.reduceat(high, firsts, axis=1)], axis=1)
+        low, high = np.empty((2, 3 * len(self._rows), self._columns, count), np.float32)
+        low[:, :size] = (middle - half).transpose(1, 2, 0)
+        high[:, :size] = (middle + half).transpose(1, 2, 0)
+        for body, (first, last) in enumerate(itertools.pairwise(self._firsts)):
+            low[:, first:last].min(axis=1, out=low[:, size + body])
+            high[:, first:last].max(axis=1, out=high[:, size + body])
         return low.reshape(-1, count), high.reshape(-1, count)
 
     def _pairs(
@@ -192,40 +192,37 @@ class Separation:
         """Lists the pairs of parts that may not meet, and on which axes to look."""
         count = self._radii.size
         self._columns = count + len(parts)
-        one: list[IntArray] = []
-        other: list[IntArray] = []
-        required: list[float] = []
-        tries: list[int] = []
+        near: list[tuple[int, int, int, float]] = []
+        far: list[tuple[int, int, int, float]] = []
         numbered = list(enumerate(parts))
         for (i, (a, first, _)), (j, (b, second, _)) in itertools.combinations(
             numbered, 2
         ):
             if checker.IsCollisionFilteredBetween(first, second):
                 continue
-            padding = float(checker.GetPaddingBetween(first, second)) + _MARGIN
-            near = b - a <= _NEAR
-            pairs = [(count + i, count + j)]
-            if near:
-                pairs = list(
-                    itertools.product(
-                        range(self._firsts[i], self._firsts[i + 1]),
-                        range(self._firsts[j], self._firsts[j + 1]),
-                    )
-                )
-            for k, m in pairs:
-                tries.append(len(one))
-                for link in range(a, b + 1) if near else (b,):
-                    rows = self._columns * (3 * link + np.arange(3))
-                    one.append(rows + k)
-                    other.append(rows + m)
-                    required.append(padding)
-        self._one: IntArray = np.stack(one, axis=1)
-        self._other: IntArray = np.stack(other, axis=1)
-        self._required, self._tries = np.array(required)[:, None], np.array(tries)
+            required = float(checker.GetPaddingBetween(first, second)) + _MARGIN
+            if b - a > _NEAR:
+                far.append((count + i, count + j, b, required))
+                continue
+            near += [
+                (k, m, link, required)
+                for k in range(self._firsts[i], self._firsts[i + 1])
+                for m in range(self._firsts[j], self._firsts[j + 1])
+                # Both links and the one between, if there is one.
+                for link in (a, (a + b + 1) // 2, b)
+            ]
+        one, other, links, needed = (
+            np.array(column) for column in zip(*near, *far, strict=True)
+        )
+        rows = self._columns * (3 * links + np.arange(3)[:, None])
+        self._one: IntArray = rows + one
+        self._other: IntArray = rows + other
+        self._required = needed.astype(np.float32)[:, None]
+        self._near = len(near)
 
     def _shadows_around(
         self, checker: CollisionChecker
-    ) -> list[tuple[int, FloatArray, FloatArray]]:
+    ) -> list[tuple[int, _Singles, _Singles]]:
         """Returns where shadows of what was added begin and end, each (3, shapes), m.
 
         On T's axes, then on W's, those shapes that are shorter there; before them the
@@ -242,7 +239,7 @@ class Separation:
             np.tensordot(np.stack([self._R_WT.T, np.eye(3)]), vectors, axes=1), radii
         )
         in_T = np.less_equal(*halves.prod(axis=1))
-        of_T = 3 * len(self._crosses) + 3
+        of_T = 3 * len(self._turns) + 3
         return [
             (
                 first,
@@ -255,7 +252,7 @@ class Separation:
         ]
 
 
-def _spans(vectors: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _spans(vectors: _Singles, radii: _Singles) -> tuple[_Singles, _Singles]:
     """Returns middles and half lengths of shadows, each (n, axes, shapes), m.
 
     Args:
