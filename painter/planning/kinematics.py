@@ -132,8 +132,8 @@ class ArmKinematics(FrozenValue):
 
     def nozzle(self, q: FloatArray) -> FloatArray:
         """Returns p_WG (n, 3), m, for `q` (n, 5), rad."""
-        _, p_WGs = self.gun_poses(q)
-        return p_WGs
+        R_WL, p_WL = self.forward(q)
+        return np.asarray(p_WL + R_WL @ self.X_LG.translation())
 
     def camera_poses(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns R_WC (n, 3, 3) and p_WC (n, 3), m, for `q` (n, 5), rad."""
