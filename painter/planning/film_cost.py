@@ -64,6 +64,17 @@ class FilmCost(FrozenValue):
     soiled_weight: float
 
     @classmethod
+    def mending(cls, site: Site) -> "FilmCost":
+        """Makes the cost of mending: a seam may be uneven, if only nothing stays thin.
+
+        Along the edge of what is mended the film is there already, and evenness would
+        leave a thin line between the two.
+        """
+        fine = cls.fine(site)
+        uneven, spilt = min(fine.uneven, _THINGS.uneven), min(fine.spilt, _THINGS.spilt)
+        return fine.replace(uneven=uneven, spilt=spilt)
+
+    @classmethod
     def coarse(cls, site: Site) -> "FilmCost":
         """Makes the cost by which strokes are found: gentle slopes lead to them."""
         weights = _weights(site)

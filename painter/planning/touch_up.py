@@ -52,7 +52,7 @@ def touch_up_strokes(
     if not thin.any():
         return ()
     model = FilmModel(site, tip=tip, speed=raster.speed, nominal=nominal)
-    fit = FilmFit(model, FilmCost.fine(site), raster=raster, film=film / nominal)
+    fit = FilmFit(model, FilmCost.mending(site), raster=raster, film=film / nominal)
     find_cut_ins(fit, model, tip=tip, raster=raster, where=thin)
     fit.fit()
     strokes = fitted_strokes(fit.spans, tip=tip, raster=raster)
