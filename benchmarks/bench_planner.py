@@ -22,7 +22,7 @@ import numpy as np
 from painter.config import load_scenario
 from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.diagrams.true_wall import true_segmentation
-from painter.planning import program, raster
+from painter.planning import program, raster, stroke_links
 from painter.planning.program import ProgramPlanner
 from perception.values import WallSegmentation
 
@@ -33,8 +33,8 @@ STAGES: dict[str, tuple[Any, str]] = {
     "cut-ins": (raster, "find_cut_ins"),
     "fit": (raster.FilmFit, "fit"),
     "cut back": (program, "clear_strokes"),
-    "order": (program, "order_strokes"),
-    "links": (program, "_linked"),
+    "order": (stroke_links, "order_strokes"),
+    "links": (stroke_links, "_linked"),
     "verify": (program, "verify_motion"),
     "verify strokes": (program, "verify_strokes"),
 }

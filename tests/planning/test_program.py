@@ -8,8 +8,9 @@ from painter.errors import CollisionError, InputError, MotionLimitError, ReachEr
 from painter.planning.clear_strokes import has_run_out
 from painter.planning.config import MotionConfig, RasterConfig
 from painter.planning.obstacles import ObstacleBox
-from painter.planning.program import _fit, strokes_from
+from painter.planning.program import strokes_from
 from painter.planning.spray_path import Motion, Stroke
+from painter.planning.stroke_links import _fit
 from painter.planning.verify import verify_motion, verify_strokes
 
 HOME = np.deg2rad(MotionConfig().home_deg)
