@@ -185,6 +185,7 @@ class ProgramPlanner(FrozenValue):
             limits=self.limits,
             near=self.raster.cut_in_standoff,
             far=self.raster.standoff,
+            stopping=RUN_OUT[0][0],
         )
         _, *obstacles = segmentation_boxes(segmentation)  # The first is the wall.
         clear = standoffs_beside(

@@ -11,7 +11,6 @@ from perception.values import FloatArray
 
 _REACH_STEP = 0.05  # m, between the places at which reach is asked for ...
 _STANDOFF_STEP = 0.015  # m, ... and between the stand-offs.
-_STOPPING = 0.10  # m, in which the gun stops beyond a stroke's end at 0.6 m/s.
 _JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
 
@@ -40,6 +39,7 @@ def nearest_standoffs(
     limits: ArmLimits,
     near: float,
     far: float,
+    stopping: float,
 ) -> FloatArray:
     """Returns the least stand-offs from which strokes along T y can be sprayed.
 
@@ -53,6 +53,7 @@ def nearest_standoffs(
         limits: Of the joints.
         near: Least stand-off that is asked for, m.
         far: Of the raster, m; whether the arm reaches that is asked elsewhere.
+        stopping: In which the gun stops beyond a stroke's end, m.
 
     Returns:
         (ny, nx) m, `near` to `far`.
@@ -60,7 +61,7 @@ def nearest_standoffs(
     columns, rows = (_spread(axis, _REACH_STEP) for axis in (x, y))
     standoffs = np.linspace(near, far, max(2, round((far - near) / _STANDOFF_STEP) + 1))
     # Away from the middle is where reach ends.
-    beyond = rows + _STOPPING * np.sign(rows - rows.mean())
+    beyond = rows + stopping * np.sign(rows - rows.mean())
     places = np.meshgrid(standoffs, beyond, columns, indexing="ij")
     p_TGs = np.stack([place.ravel() for place in places[::-1]], axis=-1)
     reached = limits.contains(gun.solve(p_TGs)).reshape(places[0].shape)

@@ -13,7 +13,9 @@ RUN_OUT = 0.10  # m beyond a stroke's end.
 
 def test_strokes_start_farther_off_where_the_arm_would_have_to_stretch(robot):
     gun = SquareGun(robot.kinematics, nominal_tile_pose(TileConfig()))
-    dut = nearest_standoffs(X, X, gun=gun, limits=robot.limits, near=0.06, far=0.315)
+    dut = nearest_standoffs(
+        X, X, gun=gun, limits=robot.limits, near=0.06, far=0.315, stopping=0.10
+    )
     assert dut.shape == (41, 41)
     # In the middle the arm is bent; in the corners it cannot come near.
     assert dut[15:26].max() == 0.06
