@@ -19,9 +19,7 @@ _MIN_FILL = 0.6  # A region that fills less of its box is split into two boxes.
 _WALL_THICKNESS = 0.10  # m, behind T z = 0.
 _WALL_BORDER = 1.0  # m of wall expected around the tile.
 _FEW = 8  # Of so many places along a motion one is looked at first.
-_AT_A_TIME = (
-    16  # Places that are looked at together in search of the first blocked one.
-)
+_AT_A_TIME = 16  # Places looked at together in search of the first blocked one.
 _INFLUENCE = 0.1  # m, how far the nearest pair is looked for when reporting.
 
 
