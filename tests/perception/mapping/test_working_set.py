@@ -43,7 +43,7 @@ def keyframe_of(frame):
 
 def views_alive():
     gc.collect()
-    return sum(isinstance(thing, View) for thing in gc.get_objects())
+    return sum(type(thing) is View for thing in gc.get_objects())
 
 
 def assert_equal(view, other):
