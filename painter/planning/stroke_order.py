@@ -41,9 +41,10 @@ def order_strokes(
     count = len(strokes)
     # Stroke k forwards is 2 k, backwards 2 k + 1; the two rests come last.
     order = [2 * count, *range(0, 2 * count, 2), 2 * count + 1]
+    rows = cost.tolist()  # Single numbers are quicker to take from lists.
     better = True
     while better:
-        better = _turn_runs(order, cost) or _move_runs(order, cost)
+        better = _turn_runs(order, rows) or _move_runs(order, cost)
     return tuple(
         reversed_stroke(strokes[k // 2]) if k % 2 else strokes[k // 2]
         for k in order[1:-1]
@@ -107,14 +108,15 @@ def _least_time(gap: FloatArray, v0: FloatArray, v1: FloatArray) -> FloatArray:
     return np.asarray(np.where(np.isfinite(least), least, cruise))
 
 
-def _turn_runs(order: list[int], cost: FloatArray) -> bool:
+def _turn_runs(order: list[int], cost: list[list[float]]) -> bool:
     """Turns runs of strokes about where that saves time; True if one was."""
     found = False
     for i in range(1, len(order) - 1):
+        from_before = cost[order[i - 1]]
         for j in range(i, len(order) - 1):
-            before, first, last, after = order[i - 1], order[i], order[j], order[j + 1]
-            old = cost[before, first] + cost[last, after]
-            new = cost[before, last ^ 1] + cost[first ^ 1, after]
+            first, last, after = order[i], order[j], order[j + 1]
+            old = from_before[first] + cost[last][after]
+            new = from_before[last ^ 1] + cost[first ^ 1][after]
             if new < old - _GAIN:
                 order[i : j + 1] = [k ^ 1 for k in reversed(order[i : j + 1])]
                 found = True
