@@ -141,7 +141,12 @@ class _Candidate:
         self._thin = np.zeros(room.size, dtype=bool)
 
     def table(
-        self, fit: FilmFit, model: FilmModel, beside: BoolArray, raster: RasterConfig
+        self,
+        fit: FilmFit,
+        model: FilmModel,
+        cost: FilmCost,
+        beside: BoolArray,
+        raster: RasterConfig,
     ) -> FloatArray | None:
         """Returns costs (ny, flows), m², or None where nothing on the line is thin.
 
@@ -157,13 +162,19 @@ class _Candidate:
             rows = np.flatnonzero((film != self._film).any(axis=1))
             self._film[rows] = film[rows]
         if rows.size:
-            self._look(rows, line, window, site, beside)
+            self._look(rows, line, window, site, cost, beside)
         if self._thin.sum() * site.cell < raster.min_stroke:
             return None
         return self._table
 
     def _look(
-        self, rows: IntArray, line: Line, window: slice, site: Site, beside: BoolArray
+        self,
+        rows: IntArray,
+        line: Line,
+        window: slice,
+        site: Site,
+        cost: FilmCost,
+        beside: BoolArray,
     ) -> None:
         """Finds the costs on some rows."""
         assert self._film is not None
@@ -172,7 +183,7 @@ class _Candidate:
         thin = wanted & (film < _THIN) & beside[rows, window] & (full > 0.0)
         on = thin.any(axis=1)
         trial = film[on] + self._flows[:, None, None] * full[on]
-        cells = FilmCost.coarse(site)(trial, wanted[on], clean[on])
+        cells = cost(trial, wanted[on], clean[on])
         table = np.zeros((rows.size, self._flows.size))
         table[on] = cells.sum(axis=2).T * site.cell**2
         table[~(on & self._room[rows]), 1:] = _NEVER
@@ -204,7 +215,8 @@ def _best_spans(
     raster: RasterConfig,
 ) -> list[tuple[float, list[Span]]]:
     """Returns what candidate lines gain, m², and the spans that gain it."""
-    tables = [line.table(fit, model, beside, raster) for line in candidates]
+    cost = FilmCost.coarse(model.site)
+    tables = [line.table(fit, model, cost, beside, raster) for line in candidates]
     lines = [
         (line, table)
         for line, table in zip(candidates, tables, strict=True)
