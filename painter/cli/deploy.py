@@ -294,7 +294,7 @@ def _check(
         result = {"passed": check.passed, "text": check.text}
         folder.log(0.0, "check", check=check.name, **result)
         if not check.passed:
-            raise BusError(f"pre-flight check {check.name}: {check.text}.")
+            raise BusError(f"pre-flight check {check.name}: {check.text.rstrip('.')}.")
 
 
 def _log_health(

@@ -129,4 +129,5 @@ def test_a_camera_that_is_not_there_fails_the_check(bench):
     words = bench.words_of("deploy")
     assert "FAIL camera: camera socket" in words
     assert "No such file" in words
+    assert ".." not in words
     assert "Traceback" not in words
