@@ -257,11 +257,10 @@ def fastest_tool_blend(
         limits: Of the joints, as far as the plan may use them.
         hop: See `ToolBlend`.
         rise: See `ToolBlend`.
-        longest: Blends that take longer are of no use, s.
+        longest: Only shorter blends are of use, s.
 
     Returns:
-        The blend, or None if no duration up to 8 s keeps reach and limits; where none
-        up to `longest` does, perhaps a longer one.
+        The blend, or None if no duration of use, up to 8 s, keeps reach and limits.
     """
     few, heights = (_hop_height(samples.s, hop, rise) for samples in (_FEW, _SAMPLES))
 
@@ -295,13 +294,12 @@ def fastest_tool_blend(
     if speed > 0.0 and travel > 0.0:
         # Going straight on at constant speed needs no acceleration of the gun at all.
         durations = np.sort(np.append(durations, travel / speed))
-    durations = durations[: np.searchsorted(durations, longest) + 1]
 
     def certain(duration: float) -> bool:
         blend = ToolBlend(start, end, duration, hop, rise)
         return keeps_limits(ToolMove(blend, gun).q, duration, limits)
 
-    duration = shortest(allowed, durations, certain)
+    duration = shortest(allowed, durations, certain, longest)
     return None if duration is None else ToolBlend(start, end, duration, hop, rise)
 
 

@@ -20,7 +20,7 @@ _SHORTEST_MOVE = 0.05  # s; a move of no length still lasts a few samples.
 # falls again: 0.1 s where a stretched arm starts off, so that drives can follow.
 _TRAVEL_RAMP = 0.2
 _SHORTEST_CRUISE = 1e-6  # s; a shorter one is rounding.
-_LONGEST_BLEND = 8.0  # s
+_DURATIONS = np.geomspace(_SHORTEST_MOVE, 8.0, 60)  # s, of blends, tried in turn.
 _SAMPLES = Shares.at(np.linspace(0.0, 1.0, 33))  # Where a blend's rates are looked at.
 # The peak between two samples may exceed what is seen at them a little.
 SEARCH_SHARE = 0.98
@@ -207,10 +207,13 @@ def fastest_joint_blend(
         The blend, or None if no duration up to 8 s keeps them.
     """
 
-    def allowed(durations: FloatArray) -> BoolArray:
+    def possible(durations: FloatArray) -> BoolArray:
         first, second = plateaus(start, end, durations)
         peak = np.maximum(np.abs(first), np.abs(second))
-        keeps = np.asarray((peak <= SEARCH_SHARE * limits.a_max).all(axis=1))
+        return np.asarray((peak <= SEARCH_SHARE * limits.a_max).all(axis=1))
+
+    def allowed(durations: FloatArray) -> BoolArray:
+        keeps = possible(durations)
         if keeps.any():
             q, v = evaluate(start, end, durations[keeps], _SAMPLES)
             slow = (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
@@ -220,8 +223,11 @@ def fastest_joint_blend(
     def certain(duration: float) -> bool:
         return keeps_limits(JointBlend(start, end, duration).q, duration, limits)
 
-    durations = np.geomspace(_SHORTEST_MOVE, _LONGEST_BLEND, 60)
-    duration = shortest(allowed, durations, certain)
+    # Most of a search is over durations that their accelerations alone rule out.
+    able = np.flatnonzero(possible(_DURATIONS))
+    if not able.size:
+        return None
+    duration = shortest(allowed, _DURATIONS[max(able[0] - 1, 0) :], certain)
     return None if duration is None else JointBlend(start, end, duration)
 
 
@@ -264,6 +270,7 @@ def shortest(
     allowed: Callable[[FloatArray], BoolArray],
     durations: FloatArray,
     certain: Callable[[float], bool] = lambda duration: True,
+    longest: float = math.inf,
 ) -> float | None:
     """Finds the shortest duration that is allowed.
 
@@ -275,7 +282,10 @@ def shortest(
         allowed: Tells of durations (k,), s, which are allowed, (k,) bool.
         durations: (n,) s, ascending grid.
         certain: A slower and closer look at one duration that is allowed.
+        longest: Only shorter ones are of use, s.
     """
+    # The first one that is of no use may still bound a gap in which others are.
+    durations = durations[: np.searchsorted(durations, longest) + 1]
     found = next(_in_turn(allowed, durations), None)
     if found is None:
         return None
@@ -284,7 +294,9 @@ def shortest(
     between = np.linspace(before, found, 8)[1:-1]
     longer = found * _SLOWER ** np.arange(1, _SLOWER_STEPS)
     slower = np.unique(np.append(durations[first:], longer[longer < durations[-1]]))
-    tries = itertools.chain(_in_turn(allowed, between), _in_turn(allowed, slower))
+    tries = itertools.chain.from_iterable(
+        _in_turn(allowed, some[some < longest]) for some in (between, slower)
+    )
     return next((duration for duration in tries if certain(duration)), None)
 
 

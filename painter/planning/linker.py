@@ -221,7 +221,7 @@ class Linker(FrozenValue):
         for rise in _RISES if hop else _RISES[:1]:
             longest = math.inf if best is None else best.duration
             move = self._tool_move(start, end, hop, rise, longest)
-            if move is not None and move.duration < longest and self.clear(move):
+            if move is not None and self.clear(move):
                 best = move
         return best
 
