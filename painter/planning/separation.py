@@ -61,6 +61,75 @@ class _Shape(FrozenValue):
         return cls(vectors, shape.radius())
 
 
+class _Shapes:
+    """Vectors of many shapes side by side, and the shadows that they throw.
+
+    Attributes:
+        count: How many shapes.
+        vectors: (k, 3), m: all centres, the first, second and third edges of boxes,
+            the edges of cylinders and their axes.
+        owners: (k,) of which shape each of these is.
+    """
+
+    def __init__(self, shapes: list[_Shape]) -> None:
+        """Makes them of shapes; centres are in their order."""
+        vectors = np.stack([shape.vectors for shape in shapes])
+        radii = np.array([shape.radius for shape in shapes], np.float32)
+        self._boxes, self._round = np.flatnonzero(radii == 0.0), np.flatnonzero(radii)
+        self._radii = radii[self._round, None]
+        self.count = len(shapes)
+        self.owners = np.concatenate(
+            [np.arange(self.count), *3 * [self._boxes], *2 * [self._round]]
+        )
+        kinds = np.repeat(
+            [0, 1, 2, 3, 3, 4],
+            [self.count, *3 * [self._boxes.size], *2 * [self._round.size]],
+        )
+        self.vectors = vectors[self.owners, :, kinds]
+
+    def spans(self, shadows: _Singles) -> tuple[_Singles, _Singles]:
+        """Returns middles and half lengths of shadows, each (axes, shapes, n), m.
+
+        Args:
+            shadows: (axes, k, n) components of the vectors on the axes.
+        """
+        boxes, count = self._boxes.size, self._round.size
+        edges = np.abs(shadows[:, self.count : len(self.vectors) - count])
+        first, second, third, along = np.split(
+            edges, [boxes, 2 * boxes, 3 * boxes], axis=1
+        )
+        across = 1.0 - shadows[:, len(self.vectors) - count :] ** 2
+        half = np.empty_like(shadows[:, : self.count])
+        half[:, self._boxes] = first + second + third
+        half[:, self._round] = along + self._radii * np.sqrt(np.maximum(across, 0.0))
+        return shadows[:, : self.count], half
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairs(FrozenValue):
+    """Pairs of parts, each of them looked at from both sides along three axes.
+
+    Attributes:
+        one: (6, pairs) where, among the ends of shadows, are those of the one.
+        other: (6, pairs) those of the other that face them.
+        required: (pairs, 1) m, by which they may not be nearer.
+    """
+
+    one: IntArray
+    other: IntArray
+    required: _Singles
+
+    def of(self, few: IntArray) -> "_Pairs":
+        """Returns a few of them."""
+        return _Pairs(self.one[:, few], self.other[:, few], self.required[few])
+
+    def apart(self, ends: _Singles) -> BoolArray:
+        """Tells of which pairs it is plain that they are apart, (pairs, n)."""
+        overlap = ends[self.one]
+        overlap += ends[self.other]
+        return np.asarray(overlap.min(axis=0) <= -self.required)
+
+
 class Separation:
     """Proves that configurations keep clear; what it does not prove stays open."""
 
@@ -89,6 +158,7 @@ class Separation:
         for turn, joint, X_WJ in zip(self._turns, joints, places, strict=True):
             turn[:3, :3] = np.cross(np.eye(3), X_WJ.rotation() @ joint.revolute_axis())
             turn[:3, 3] = -turn[:3, :3] @ X_WJ.translation()
+        self._squares = self._turns @ self._turns
         moved = [
             set(plant.GetBodiesKinematicallyAffectedBy([joint.index()]))
             for joint in joints
@@ -102,20 +172,23 @@ class Separation:
             _, _, shapes = bodies.setdefault(int(body.index()), (link, body, []))
             shapes.append(_Shape.of(inspector.GetShape(geometry), X_WS))
         parts = sorted(bodies.values(), key=lambda part: part[0])
-        shapes = [shape for _, _, some in parts for shape in some]
-        counts = [len(some) for _, _, some in parts]
-        self._firsts = np.cumsum([0, *counts])
-        vectors = np.stack([shape.vectors for shape in shapes], axis=2)
-        self._vectors = np.concatenate([vectors, np.zeros_like(vectors[:1])])
-        self._vectors[3, 0] = 1.0  # Centres move as well, edges and axes but turn.
-        self._radii = np.array([shape.radius for shape in shapes], np.float32)
+        counts = [len(shapes) for _, _, shapes in parts]
         links = np.array([link for link, _, _ in parts])
-        # The shapes of each link are a row; those of the robot's foot come first.
-        self._rows = np.searchsorted(np.repeat(links, counts), range(len(joints) + 2))
-        self._moving = len(shapes) + np.flatnonzero(links > 0)
+        self._shapes = _Shapes([shape for _, _, some in parts for shape in some])
+        self._firsts = np.cumsum([0, *counts])
+        # Of each link's pose its columns: three axes, and where its origin is.
+        vectors = self._shapes.vectors
+        self._vectors = np.zeros((len(joints) + 1, 4, len(vectors)), np.float32)
+        of_link = np.repeat(links, counts)[self._shapes.owners]
+        self._vectors[of_link, :3, np.arange(len(vectors))] = vectors
+        # Centres move as well, edges and axes but turn.
+        centres = np.arange(self._shapes.count)
+        self._vectors[of_link[centres], 3, centres] = 1.0
         self._R_WT = X_WT.rotation().matrix()
+        self._parts = self._shapes.count + len(parts)
         self._pairs(checker, parts)
-        self._around = self._shadows_around(checker)
+        moving = self._shapes.count + np.flatnonzero(links > 0)
+        self._around = self._shadows_around(checker, moving)
 
     def proven(self, q: FloatArray, clearance: float) -> BoolArray:
         """Tells of which configurations it is plain that they keep clear.
@@ -135,65 +208,62 @@ class Separation:
         return np.concatenate(some) if some else np.zeros(0, dtype=bool)
 
     def _proven(self, q: FloatArray, clearance: float) -> BoolArray:
-        lows, highs = self._shadows(q)
-        apart = np.zeros((len(self._required), len(q)), dtype=bool)
-        for one, other in zip(self._one, self._other, strict=True):
-            apart |= lows[one] - highs[other] >= self._required
-            apart |= lows[other] - highs[one] >= self._required
-        near, far = np.split(apart, [self._near])
-        clear = near.reshape(-1, 3, len(q)).any(axis=1).all(axis=0) & far.all(axis=0)
-        for first, around_low, around_high in self._around:
-            beside = np.zeros((self._moving.size, around_low.shape[1], len(q)), bool)
-            for axis in range(3):
-                rows = self._columns * (first + axis) + self._moving
-                beside |= lows[rows, None] >= around_high[axis, :, None] + clearance
-                beside |= highs[rows, None] <= around_low[axis, :, None] - clearance
-            clear &= beside.all(axis=(0, 1))
+        ends = self._ends(q)
+        clear = self._far.apart(ends).all(axis=0)
+        # The axes of one link show it of nearly all pairs.
+        first, *others = self._near
+        apart = first.apart(ends)
+        few = np.flatnonzero(~apart.all(axis=1))
+        if few.size:
+            for pairs in others:
+                apart[few] |= pairs.of(few).apart(ends)
+        clear &= apart.all(axis=0)
+        for rows, facing in self._around:
+            overlap = ends[rows][:, :, None] + facing[:, None]
+            clear &= (overlap.min(axis=0) <= -clearance).all(axis=(0, 1))
         return np.asarray(clear)
 
-    def _shadows(self, q: FloatArray) -> tuple[_Singles, _Singles]:
-        """Returns where shadows begin and end on axes, each (axes * parts, n), m.
+    def _ends(self, q: FloatArray) -> _Singles:
+        """Returns where shadows end along axes and against them, (rows, n), m.
 
         Axes are those of the links from the foot on, three each, and those of T; parts
-        are shapes, and after them whole bodies.
+        are shapes, and after them whole bodies. Against an axis counts what lies below
+        zero. See `_rows`.
         """
-        count, size = len(q), self._radii.size
+        count, size, vectors = len(q), self._shapes.count, len(self._shapes.vectors)
         angle = q[:, :, None, None]
         turns = np.eye(4) + np.sin(angle) * self._turns
-        turns += (1.0 - np.cos(angle)) * (self._turns @ self._turns)
-        placed = np.empty((count, 3, 5, size), np.float32)
-        axes = np.empty((count, len(self._rows), 3, 3), np.float32)
+        turns += (1.0 - np.cos(angle)) * self._squares
+        X = np.empty((1 + len(self._turns), count, 4, 4))
+        X[0] = np.eye(4)
+        for link, before in enumerate(X[:-1]):
+            np.matmul(before, turns[:, link], out=X[link + 1])
+        poses = X[:, :, :3].transpose(1, 2, 0, 3).astype(np.float32)
+        placed = poses.reshape(3 * count, -1) @ self._vectors.reshape(-1, vectors)
+        axes = np.empty((count, len(X) + 1, 3, 3), np.float32)
+        axes[:, :-1] = poses[..., :3].transpose(0, 2, 3, 1)
         axes[:, -1] = self._R_WT.T
-        X = np.tile(np.eye(4), (count, 1, 1))
-        for link, (first, last) in enumerate(itertools.pairwise(self._rows)):
-            if link:
-                X = X @ turns[:, link - 1]
-            axes[:, link] = X[:, :3, :3].transpose(0, 2, 1)
-            placed[..., first:last] = (
-                X[:, :3].reshape(-1, 4) @ self._vectors[..., first:last].reshape(4, -1)
-            ).reshape(count, 3, 5, -1)
-        along = axes.reshape(count, -1, 3)
-        shadows = (along @ placed.reshape(count, 3, -1)).reshape(count, -1, 5, size)
-        middle, half = _spans(shadows, self._radii)
-        # Rows of many configurations are quicker to pick than columns.
-        low, high = np.empty((2, 3 * len(self._rows), self._columns, count), np.float32)
-        low[:, :size] = (middle - half).transpose(1, 2, 0)
-        high[:, :size] = (middle + half).transpose(1, 2, 0)
+        shadows = axes.reshape(count, -1, 3) @ placed.reshape(count, 3, -1)
+        # Configurations come last, so that all else is done to whole rows of them.
+        shadows = np.ascontiguousarray(shadows.reshape(count, -1).T)
+        middle, half = self._shapes.spans(shadows.reshape(-1, vectors, count))
+        ends = np.empty((2, len(half), self._parts, count), np.float32)
+        np.add(half, middle, out=ends[0, :, :size])
+        np.subtract(half, middle, out=ends[1, :, :size])
         for body, (first, last) in enumerate(itertools.pairwise(self._firsts)):
-            low[:, first:last].min(axis=1, out=low[:, size + body])
-            high[:, first:last].max(axis=1, out=high[:, size + body])
-        return low.reshape(-1, count), high.reshape(-1, count)
+            ends[:, :, first:last].max(axis=2, out=ends[:, :, size + body])
+        return ends.reshape(-1, count)
 
-    def _pairs(
-        self,
-        checker: CollisionChecker,
-        parts: list[_Part],
-    ) -> None:
+    def _rows(self, axes: IntArray, parts: IntArray) -> tuple[IntArray, IntArray]:
+        """Returns where the ends of parts along axes are, and those against them."""
+        along = self._parts * axes + parts
+        return along, along + self._parts * 3 * (len(self._turns) + 2)
+
+    def _pairs(self, checker: CollisionChecker, parts: list[_Part]) -> None:
         """Lists the pairs of parts that may not meet, and on which axes to look."""
-        count = self._radii.size
-        self._columns = count + len(parts)
-        near: list[tuple[int, int, int, float]] = []
-        far: list[tuple[int, int, int, float]] = []
+        count = self._shapes.count
+        near: list[tuple[int, int, float, tuple[int, ...]]] = []
+        far: list[tuple[int, int, float, tuple[int, ...]]] = []
         numbered = list(enumerate(parts))
         for (i, (a, first, _)), (j, (b, second, _)) in itertools.combinations(
             numbered, 2
@@ -202,63 +272,71 @@ class Separation:
                 continue
             required = float(checker.GetPaddingBetween(first, second)) + _MARGIN
             if b - a > _NEAR:
-                far.append((count + i, count + j, b, required))
+                far.append((count + i, count + j, required, (b,)))
                 continue
             near += [
-                (k, m, link, required)
+                # Both links and the one between, if there is one.
+                (k, m, required, (b, (a + b + 1) // 2, a))
                 for k in range(self._firsts[i], self._firsts[i + 1])
                 for m in range(self._firsts[j], self._firsts[j + 1])
-                # Both links and the one between, if there is one.
-                for link in (a, (a + b + 1) // 2, b)
             ]
-        one, other, links, needed = (
-            np.array(column) for column in zip(*near, *far, strict=True)
+        (self._far,) = self._listed(far)
+        self._near = self._listed(near)
+
+    def _listed(
+        self, pairs: list[tuple[int, int, float, tuple[int, ...]]]
+    ) -> list[_Pairs]:
+        """Returns pairs (one, other, required, links) on the axes of each link."""
+        one, other, required, links = (
+            np.array(column) for column in zip(*pairs, strict=True)
         )
-        rows = self._columns * (3 * links + np.arange(3)[:, None])
-        self._one: IntArray = rows + one
-        self._other: IntArray = rows + other
-        self._required = needed.astype(np.float32)[:, None]
-        self._near = len(near)
+        listed = []
+        for of_pair in links.T:
+            axes = 3 * of_pair + np.arange(3)[:, None]
+            (ahead, back), (beyond, before) = (
+                self._rows(axes, part) for part in (one, other)
+            )
+            listed.append(
+                _Pairs(
+                    np.concatenate([ahead, back]),
+                    np.concatenate([before, beyond]),
+                    required.astype(np.float32)[:, None],
+                )
+            )
+        return listed
 
     def _shadows_around(
-        self, checker: CollisionChecker
-    ) -> list[tuple[int, _Singles, _Singles]]:
-        """Returns where shadows of what was added begin and end, each (3, shapes), m.
+        self, checker: CollisionChecker, moving: IntArray
+    ) -> list[tuple[IntArray, _Singles]]:
+        """Returns where shadows of what was added end that moving parts face.
 
-        On T's axes, then on W's, those shapes that are shorter there; before them the
-        number of the first of these axes.
+        On T's axes, then on W's, those shapes that are shorter there.
+
+        Returns:
+            Twice the rows (6, moving) of ends and the ends (6, shapes, 1), m.
         """
-        shapes = [
-            _Shape.of(added.shape(), added.pose_in_body())
-            for group in checker.GetAllAddedCollisionShapes().values()
-            for added in group
-        ]
-        vectors = np.stack([shape.vectors for shape in shapes], axis=2)
-        radii = np.array([shape.radius for shape in shapes])
-        middles, halves = _spans(
-            np.tensordot(np.stack([self._R_WT.T, np.eye(3)]), vectors, axes=1), radii
+        shapes = _Shapes(
+            [
+                _Shape.of(added.shape(), added.pose_in_body())
+                for group in checker.GetAllAddedCollisionShapes().values()
+                for added in group
+            ]
         )
-        in_T = np.less_equal(*halves.prod(axis=1))
         of_T = 3 * len(self._turns) + 3
+        axes = np.concatenate([self._R_WT.T, np.eye(3)])
+        middle, half = shapes.spans((axes @ shapes.vectors.T)[..., None])
+        in_T = np.less_equal(*half.reshape(2, 3, -1).prod(axis=1))
         return [
             (
-                first,
-                middle[:, which] - half[:, which],
-                middle[:, which] + half[:, which],
+                np.concatenate(self._rows(first + np.arange(3)[:, None], moving)),
+                # Against the axes first: those face the ends along them.
+                np.concatenate([half - middle, half + middle])[:, which],
             )
             for first, which, middle, half in zip(
-                (of_T, 0), (in_T, ~in_T), middles, halves, strict=True
+                (of_T, 0),
+                (in_T, ~in_T),
+                np.split(middle, 2),
+                np.split(half, 2),
+                strict=True,
             )
         ]
-
-
-def _spans(vectors: _Singles, radii: _Singles) -> tuple[_Singles, _Singles]:
-    """Returns middles and half lengths of shadows, each (n, axes, shapes), m.
-
-    Args:
-        vectors: (n, axes, 5, shapes) components of the shapes' vectors on the axes.
-        radii: (shapes,) m.
-    """
-    half = np.abs(vectors[:, :, 1:4]).sum(axis=2)
-    half += radii * np.sqrt(np.maximum(1.0 - vectors[:, :, 4] ** 2, 0.0))
-    return vectors[:, :, 0], half
