@@ -264,11 +264,11 @@ def fastest_tool_blend(
     """
     few, heights = (_hop_height(samples.s, hop, rise) for samples in (_FEW, _SAMPLES))
 
+    def possible(durations: FloatArray) -> BoolArray:
+        return kept(durations, _FEW, few, every=3)
+
     def allowed(durations: FloatArray) -> BoolArray:
-        keeps = kept(durations, _FEW, few, every=3)
-        if keeps.any():
-            keeps[keeps] = kept(durations[keeps], _SAMPLES, heights, every=1)
-        return keeps
+        return kept(durations, _SAMPLES, heights, every=1)
 
     def kept(
         durations: FloatArray, samples: Shares, heights: FloatArray, *, every: int
@@ -299,7 +299,7 @@ def fastest_tool_blend(
         blend = ToolBlend(start, end, duration, hop, rise)
         return keeps_limits(ToolMove(blend, gun).q, duration, limits)
 
-    duration = shortest(allowed, durations, certain, longest)
+    duration = shortest(allowed, durations, certain, longest=longest, possible=possible)
     return None if duration is None else ToolBlend(start, end, duration, hop, rise)
 
 

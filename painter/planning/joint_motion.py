@@ -28,7 +28,7 @@ _DENSE_STEP = 0.004  # s, of the second look at a move that was found.
 _TORQUE_EVERY = 5  # Of these samples, one is looked at for torque.
 _SLOWER = 1.05  # By which a move is slowed that fails the second look,
 _SLOWER_STEPS = 30  # and how often.
-_AT_A_TIME = 8  # Durations that are looked at together.
+_AT_A_TIME = 6  # Durations that are looked at together.
 
 
 class Segment(Protocol):
@@ -223,11 +223,7 @@ def fastest_joint_blend(
     def certain(duration: float) -> bool:
         return keeps_limits(JointBlend(start, end, duration).q, duration, limits)
 
-    # Most of a search is over durations that their accelerations alone rule out.
-    able = np.flatnonzero(possible(_DURATIONS))
-    if not able.size:
-        return None
-    duration = shortest(allowed, _DURATIONS[max(able[0] - 1, 0) :], certain)
+    duration = shortest(allowed, _DURATIONS, certain, possible=possible)
     return None if duration is None else JointBlend(start, end, duration)
 
 
@@ -270,7 +266,9 @@ def shortest(
     allowed: Callable[[FloatArray], BoolArray],
     durations: FloatArray,
     certain: Callable[[float], bool] = lambda duration: True,
+    *,
     longest: float = math.inf,
+    possible: Callable[[FloatArray], BoolArray] | None = None,
 ) -> float | None:
     """Finds the shortest duration that is allowed.
 
@@ -283,10 +281,12 @@ def shortest(
         durations: (n,) s, ascending grid.
         certain: A slower and closer look at one duration that is allowed.
         longest: Only shorter ones are of use, s.
+        possible: A quicker look, at the whole grid: what it rules out is not allowed.
     """
     # The first one that is of no use may still bound a gap in which others are.
     durations = durations[: np.searchsorted(durations, longest) + 1]
-    found = next(_in_turn(allowed, durations), None)
+    able = durations if possible is None else durations[possible(durations)]
+    found = next(_in_turn(allowed, able), None)
     if found is None:
         return None
     first = int(np.searchsorted(durations, found))

@@ -19,7 +19,6 @@ _MIN_FILL = 0.6  # A region that fills less of its box is split into two boxes.
 _WALL_THICKNESS = 0.10  # m, behind T z = 0.
 _WALL_BORDER = 1.0  # m of wall expected around the tile.
 _FEW = 8  # Of so many places along a motion one is looked at first.
-_AT_A_TIME = 16  # Places looked at together in search of the first blocked one.
 _INFLUENCE = 0.1  # m, how far the nearest pair is looked for when reporting.
 
 
@@ -225,14 +224,16 @@ class ClearSpace:
             CollisionError: Names time, bodies, what they lack and the clearance.
         """
         doubtful = np.flatnonzero(~self._proven(q, slack))
-        for begin in range(0, len(doubtful), _AT_A_TIME):
-            rows = doubtful[begin : begin + _AT_A_TIME]
+        begin, count = 0, 1
+        while begin < len(doubtful):
+            # Of a motion that is blocked the first such place is mostly soon found.
+            rows = doubtful[begin : begin + count]
             free = self._checked(q[rows], slack)
-            if free.all():
-                continue
-            first = int(rows[np.argmin(free)])
-            raise CollisionError(
-                f"{what}: {self.worst_pair(q[first])} at {time[first]:.2f} s; "
-                f"clearance is {1e3 * self.clearance:.0f} mm, "
-                f"{1e3 * self._floor_clearance:.0f} mm from floor and frame."
-            )
+            if not free.all():
+                first = int(rows[np.argmin(free)])
+                raise CollisionError(
+                    f"{what}: {self.worst_pair(q[first])} at {time[first]:.2f} s; "
+                    f"clearance is {1e3 * self.clearance:.0f} mm, "
+                    f"{1e3 * self._floor_clearance:.0f} mm from floor and frame."
+                )
+            begin, count = begin + count, 2 * count

@@ -94,7 +94,7 @@ def test_a_bound_on_what_is_of_use_changes_nothing_below_it(longest):
         asked.append(t)
         return t > 1.61
 
-    found = shortest(search[0], grid, certain, longest)
+    found = shortest(search[0], grid, certain, longest=longest)
     assert found == (unbound if unbound < longest else None)
     assert all(t < longest for t in asked)
 
