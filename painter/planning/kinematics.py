@@ -132,8 +132,21 @@ class ArmKinematics(FrozenValue):
 
     def nozzle(self, q: FloatArray) -> FloatArray:
         """Returns p_WG (n, 3), m, for `q` (n, 5), rad."""
-        R_WL, p_WL = self.forward(q)
-        return np.asarray(p_WL + R_WL @ self.X_LG.translation())
+        return self._points(q, self.X_LG)
+
+    def spray_axis(self, q: FloatArray) -> FloatArray:
+        """Returns the nozzle's z axis in W (n, 3), unit, for `q` (n, 5), rad."""
+        cosine, sine = np.cos(q), np.sin(q)
+        pitch = q[:, 1:4].sum(axis=1)
+        ahead = np.cos(pitch) * cosine[:, 4]
+        return np.stack(
+            [
+                cosine[:, 0] * ahead - sine[:, 0] * sine[:, 4],
+                sine[:, 0] * ahead + cosine[:, 0] * sine[:, 4],
+                -np.sin(pitch) * cosine[:, 4],
+            ],
+            axis=-1,
+        )
 
     def camera_poses(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Returns R_WC (n, 3, 3) and p_WC (n, 3), m, for `q` (n, 5), rad."""
@@ -202,9 +215,8 @@ class ArmKinematics(FrozenValue):
         Returns:
             (n - 1,) m, straight from one place to the next.
         """
-        _, p_WE, p_WL = self._joint_points(np.asarray(q, dtype=float))
-        _, p_WG = self.gun_poses(q)
-        _, p_WC = self.camera_poses(q)
+        _, p_WE, p_WL = self._joint_points(q)
+        p_WG, p_WC = self._points(q, self.X_LG), self._points(q, self.X_LC)
         moved = np.diff(np.stack([p_WE, p_WL, p_WG, p_WC]), axis=1)
         return np.asarray(np.sqrt((moved**2).sum(axis=2)).max(axis=0))
 
@@ -224,6 +236,22 @@ class ArmKinematics(FrozenValue):
         p_WL = p_WE + self.forearm * along(q[:, 1] + q[:, 2])
         return p_WS, p_WE, p_WL
 
+    def _points(self, q: FloatArray, X_LF: RigidTransform) -> FloatArray:
+        """Returns the origin p_WF (n, 3) of a mount, m, for `q` (n, 5), rad."""
+        ahead, _, above = X_LF.translation()
+        bend = np.cumsum(q[:, 1:4], axis=1)
+        cosine, sine = np.cos(bend), np.sin(bend)
+        c1, s1 = np.cos(q[:, 0]), np.sin(q[:, 0])
+        out = ahead * np.cos(q[:, 4])
+        a, b = self.upper_arm, self.forearm
+        # In the arm's plane, ahead of the base axis and up, and square to it.
+        x = a * cosine[:, 0] + b * cosine[:, 1] + out * cosine[:, 2]
+        x += above * sine[:, 2]
+        z = self.shoulder_height + above * cosine[:, 2] - out * sine[:, 2]
+        z -= a * sine[:, 0] + b * sine[:, 1]
+        y = ahead * np.sin(q[:, 4])
+        return np.stack([c1 * x - s1 * y, s1 * x + c1 * y, z], axis=-1)
+
     def _poses(
         self, q: FloatArray, X_LF: RigidTransform
     ) -> tuple[FloatArray, FloatArray]:
@@ -242,22 +270,23 @@ class ArmKinematics(FrozenValue):
             if sign not in (-1, 1):
                 raise ValueError(f"{name} must be +1 or -1, got {sign!r}.")
         p_WF = np.atleast_2d(np.asarray(p_WF, dtype=float))
-        axis_W = np.broadcast_to(np.asarray(axis_W, dtype=float), p_WF.shape)
+        axis_W = np.asarray(axis_W, dtype=float)
+        across_x, across_y, up = axis_W.T
         ahead, _, above = X_LF.translation()
 
         # L z lies in the vertical plane of the arm, so going back along L x is enough
         # to find that plane, and with it the base yaw.
-        p_WA = p_WF - ahead * axis_W
-        yaw = np.arctan2(shoulder * p_WA[:, 1], shoulder * p_WA[:, 0])
+        x_WA, y_WA, z_WA = (p_WF - ahead * axis_W).T
+        yaw = np.arctan2(shoulder * y_WA, shoulder * x_WA)
         c1, s1 = np.cos(yaw), np.sin(yaw)
-        axis_x = c1 * axis_W[:, 0] + s1 * axis_W[:, 1]
-        axis_y = -s1 * axis_W[:, 0] + c1 * axis_W[:, 1]
-        pitch = np.arctan2(-axis_W[:, 2], axis_x)
-        wrist_yaw = np.arctan2(axis_y, np.hypot(axis_x, axis_W[:, 2]))
+        axis_x = c1 * across_x + s1 * across_y
+        axis_y = c1 * across_y - s1 * across_x
+        pitch = np.arctan2(-up, axis_x)
+        wrist_yaw = np.arctan2(axis_y, np.hypot(axis_x, up))
 
         # Wrist centre in the arm's plane: x ahead of the shoulder, z above it.
-        x = c1 * p_WA[:, 0] + s1 * p_WA[:, 1] - above * np.sin(pitch)
-        z = p_WA[:, 2] - self.shoulder_height - above * np.cos(pitch)
+        x = c1 * x_WA + s1 * y_WA - above * np.sin(pitch)
+        z = z_WA - self.shoulder_height - above * np.cos(pitch)
         distance_squared = x**2 + z**2
         a, b = self.upper_arm, self.forearm
         cos_elbow = (distance_squared - a**2 - b**2) / (2.0 * a * b)
@@ -268,11 +297,15 @@ class ArmKinematics(FrozenValue):
         q = np.empty((len(yaw), 5))
         q[:, 0], q[:, 1], q[:, 2] = yaw, q2, q3
         q[:, 3], q[:, 4] = pitch - q2 - q3, wrist_yaw
-        q[~np.isfinite(q).all(axis=1)] = np.nan
+        # Whatever is not finite comes into the elbow.
+        unreached = np.isnan(q3)
+        if unreached.any():
+            q[unreached] = np.nan
         below = np.pi - q
         around = (below < 0.0) | (below >= 2.0 * np.pi)
         # Few turn more than half way round, and the remainder of all takes its time.
-        below[around] = np.mod(below[around], 2.0 * np.pi)
+        if around.any():
+            below[around] = np.mod(below[around], 2.0 * np.pi)
         wrapped: FloatArray = np.pi - below
         return wrapped
 

@@ -188,10 +188,9 @@ def _gun_in_tile(
     q: FloatArray, X_WT: RigidTransform, kinematics: ArmKinematics
 ) -> tuple[FloatArray, FloatArray]:
     """Returns the nozzle (n, 3), m, and the spray axis (n, 3), both in T."""
-    R_WGs, p_WGs = kinematics.gun_poses(q)
     X_TW = X_WT.inverse()
-    p_TGs = (X_TW @ p_WGs.T).T
-    axes_T = (X_TW.rotation().matrix() @ R_WGs[:, :, 2].T).T
+    p_TGs = (X_TW @ kinematics.nozzle(q).T).T
+    axes_T = (X_TW.rotation().matrix() @ kinematics.spray_axis(q).T).T
     return p_TGs, axes_T
 
 

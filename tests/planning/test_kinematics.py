@@ -108,6 +108,25 @@ def test_out_of_reach_is_nan_and_the_rest_is_solved():
     np.testing.assert_array_equal(np.isnan(q).any(axis=1), [False, True, True])
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("what", [0, 1])
+@pytest.mark.parametrize("axis", range(3))
+def test_what_is_not_finite_is_nan_throughout(value, what, axis):
+    asked = np.array([[1.2, 0.3, 1.0], [1.0, 0.0, 0.0]])
+    asked[what, axis] = value
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(ARM.solve(asked[:1], asked[1])).all()
+
+
+def test_nozzle_and_spray_axis_are_those_of_the_gun_pose():
+    q = random_positions(200)
+    # A mount above L x as well, as the camera's is.
+    for arm in (ARM, ARM.replace(X_LG=ARM.X_LC)):
+        R_WG, p_WG = arm.gun_poses(q)
+        np.testing.assert_allclose(arm.nozzle(q), p_WG, atol=1e-14)
+        np.testing.assert_allclose(arm.spray_axis(q), R_WG[:, :, 2], atol=1e-14)
+
+
 def test_jacobian_is_the_derivative_of_the_nozzle_pose():
     q = random_positions(50)
     jacobian = ARM.gun_jacobian(q)
