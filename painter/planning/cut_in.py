@@ -13,9 +13,10 @@ from scipy.ndimage import maximum_filter
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.deposition import half_axes
 from painter.planning.film_cost import FilmCost, stroke_cost
-from painter.planning.film_fit import FilmFit, Span
+from painter.planning.film_fit import FilmFit
 from painter.planning.film_model import FilmModel, Line, Site
 from painter.planning.leaning import leaning_lines
+from painter.planning.spans import Span
 from perception.values import BoolArray, FloatArray, IntArray
 
 _SPACING = 0.02  # m, between candidate lines ...

@@ -13,7 +13,8 @@ from scipy.ndimage import maximum_filter
 
 from painter.planning.config import RasterConfig
 from painter.planning.film_cost import FilmCost, stroke_cost
-from painter.planning.film_model import FilmModel, Line
+from painter.planning.film_model import FilmModel
+from painter.planning.spans import Span, Window, reached, span_film
 from perception.values import BoolArray, FloatArray
 
 # Steps across, along (m), of flow (share) and stand-off (m): coarse, then fine.
@@ -38,33 +39,6 @@ _LOSS_FOR_CHANGE = 2.0
 _GUN_REACH = 0.07
 _GUN_FRONT = 0.05
 
-
-class Span(NamedTuple):
-    """A stroke while it is fitted; m, flow as share of nominal.
-
-    It goes up from T y `low` to `high`, and by `lean` to the right for each metre up;
-    `x` is where its line meets T y = 0.
-    """
-
-    x: float
-    low: float
-    high: float
-    standoff: float
-    flow: float
-    lean: float = 0.0
-
-    def x_at(self, y: float) -> float:
-        """Returns the place across at T y, m."""
-        return self.x + self.lean * y
-
-
-class _Window(NamedTuple):
-    """Rows and columns of the site."""
-
-    rows: slice
-    columns: slice
-
-
 _Step = tuple[str, float]  # A number of a span, and by how much it varies.
 
 
@@ -79,7 +53,7 @@ class _Loss(NamedTuple):
     """
 
     area: float
-    window: _Window
+    window: Window
     moved: float
     moved_in_all: float
 
@@ -88,7 +62,7 @@ class _Laid:
     """A span with the film that it leaves, and the steps of it that did not help."""
 
     def __init__(
-        self, span: Span, window: _Window, film: FloatArray, has_room: bool
+        self, span: Span, window: Window, film: FloatArray, has_room: bool
     ) -> None:
         """Takes a span, its film on the cells that it reaches, and if it has room."""
         self.span, self.window, self.film = span, window, film
@@ -188,8 +162,8 @@ class FilmFit:
         span = self._laid[index].span
         steps = [("x", across), ("low", along), ("high", along)]
         if span.standoff < self._raster.standoff:
-            if span.high - span.low > _SHORTEST_LEANING:
-                steps.append(("lean", 2.0 * across / (span.high - span.low)))
+            if span.length > _SHORTEST_LEANING:
+                steps.append(("lean", 2.0 * across / (span.length)))
             if standoff:
                 steps.append(("standoff", standoff))
         steps.append(("flow", flow * span.standoff / self._raster.standoff))
@@ -220,7 +194,7 @@ class FilmFit:
                 return None
         if not self.least_flow <= trial.flow <= 1.0 + 1e-9:
             return None
-        if trial.high - trial.low < raster.min_stroke:
+        if trial.length < raster.min_stroke:
             return None
         is_on_line = laid.has_room and name in ("flow", "low", "high")
         if is_on_line and trial.low >= span.low and trial.high <= span.high:
@@ -262,22 +236,21 @@ class FilmFit:
             film = self.film[changed] - laid.film
             film += laid.film * (trial.flow / span.flow)
         else:
-            line, reached = self._reached(trial)
-            changed = _hull(laid.window, reached)
+            line, new = reached(self._model, trial)
+            changed = laid.window.hull(new)
             if name in ("low", "high"):
                 # The film beyond the blur of the end that moves is as it was.
                 low, high = sorted((getattr(span, name), getattr(trial, name)))
                 rows = self._model.rows(low, high, span.standoff)
-                changed = _cut(changed, rows)
-                reached = _cut(reached, rows)
+                changed, new = changed.cut(rows), new.cut(rows)
             film = self.film[changed].copy()
-            part = _part(film, changed, laid.window)
-            part -= _part(laid.film, laid.window, changed)
-            part = _part(film, changed, reached)
-            part += self._film(trial, line, reached)
+            part = changed.part(film, laid.window)
+            part -= laid.window.part(laid.film, changed)
+            part = changed.part(film, new)
+            part += span_film(self._model, trial, line, new)
         costs = self._cell_costs(film, changed)
         gain = float((self._costs[changed] - costs).sum()) * self._model.site.cell**2
-        gain += stroke_cost(span.high - span.low) - stroke_cost(trial.high - trial.low)
+        gain += stroke_cost(span.length) - stroke_cost(trial.length)
         if gain < _GAIN:
             laid.failed[step] = self._loss(-gain, changed)
             return False
@@ -296,7 +269,7 @@ class FilmFit:
                 costs = self._cell_costs(film, laid.window)
                 loss = float((costs - self._costs[laid.window]).sum())
                 loss *= self._model.site.cell**2
-                loss -= stroke_cost(laid.span.high - laid.span.low)
+                loss -= stroke_cost(laid.span.length)
                 if loss < 0.0:
                     self._change(laid.window, film, costs)
                     continue
@@ -306,14 +279,14 @@ class FilmFit:
         self._laid = kept
         return dropped
 
-    def _change(self, window: _Window, film: FloatArray, costs: FloatArray) -> None:
+    def _change(self, window: Window, film: FloatArray, costs: FloatArray) -> None:
         """Takes over a film and its costs on a window."""
         moved = np.abs(film - self.film[window])
         self._moved[window] += moved
         self._moved_in_all += float(moved.sum()) * self._model.site.cell**2
         self.film[window], self._costs[window] = film, costs
 
-    def _loss(self, area: float, window: _Window) -> _Loss:
+    def _loss(self, area: float, window: Window) -> _Loss:
         return _Loss(area, window, self._moved_on(window), self._moved_in_all)
 
     def _still_loses(self, last: _Loss) -> bool:
@@ -324,65 +297,9 @@ class FilmFit:
         moved = self._moved_on(last.window) - last.moved
         return last.area >= _LOSS_FOR_CHANGE * moved
 
-    def _moved_on(self, window: _Window) -> float:
+    def _moved_on(self, window: Window) -> float:
         return float(self._moved[window].sum()) * self._model.site.cell**2
 
     def _lay(self, span: Span, has_room: bool) -> _Laid:
-        line, window = self._reached(span)
-        return _Laid(span, window, self._film(span, line, window), has_room)
-
-    def _reached(self, span: Span) -> tuple[Line, _Window]:
-        """Returns a span's line and the cells that its film reaches."""
-        rows = self._model.rows(span.low, span.high, span.standoff)
-        line = self._model.line(span.x, span.standoff, span.lean, rows)
-        return line, _Window(rows, slice(*line.columns))
-
-    def _film(self, span: Span, line: Line, window: _Window) -> FloatArray:
-        """Returns a span's film on rows of its window."""
-        first, stop = window.rows.start, window.rows.stop
-        film = np.asarray(span.flow * line.film[line.own(window.rows)])
-        begun = self._model.rows(span.low, span.low, span.standoff)
-        ended = self._model.rows(span.high, span.high, span.standoff)
-        if begun.stop > ended.start:
-            share = self._model.below(line, window.rows, span.low)
-            share -= self._model.below(line, window.rows, span.high)
-            film *= share
-            return film
-        # In between all of the fan passes over each cell.
-        if first < begun.stop:
-            rows = slice(first, min(begun.stop, stop))
-            film[: rows.stop - first] *= self._model.below(line, rows, span.low)
-        if ended.start < stop:
-            rows = slice(max(first, ended.start), stop)
-            share = self._model.below(line, rows, span.high)
-            film[rows.start - first :] *= 1.0 - share
-        return film
-
-
-def _hull(a: _Window, b: _Window) -> _Window:
-    """Returns the least window that holds both."""
-    (rows, columns), (other_rows, other_columns) = a, b
-    return _Window(
-        slice(min(rows.start, other_rows.start), max(rows.stop, other_rows.stop)),
-        slice(
-            min(columns.start, other_columns.start),
-            max(columns.stop, other_columns.stop),
-        ),
-    )
-
-
-def _cut(window: _Window, rows: slice) -> _Window:
-    """Returns what of a window lies in some rows; it may be empty."""
-    start = max(window.rows.start, rows.start)
-    stop = max(min(window.rows.stop, rows.stop), start)
-    return _Window(slice(start, stop), window.columns)
-
-
-def _part(film: FloatArray, window: _Window, other: _Window) -> FloatArray:
-    """Returns what of a film on one window lies in another, too."""
-    (rows, columns), (other_rows, other_columns) = window, other
-    return film[
-        max(other_rows.start - rows.start, 0) : max(other_rows.stop - rows.start, 0),
-        max(other_columns.start - columns.start, 0) : other_columns.stop
-        - columns.start,
-    ]
+        line, window = reached(self._model, span)
+        return _Laid(span, window, span_film(self._model, span, line, window), has_room)

@@ -15,8 +15,9 @@ from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.cut_in import find_cut_ins
 from painter.planning.deposition import mean_film
 from painter.planning.film_cost import FilmCost
-from painter.planning.film_fit import LEAST_FLOW, FilmFit, Span
+from painter.planning.film_fit import LEAST_FLOW, FilmFit
 from painter.planning.film_model import FilmModel, Site
+from painter.planning.spans import Span
 from painter.planning.spray_path import Stroke
 from painter.planning.stroke_lines import (
     EDGE_FLOW,

@@ -11,9 +11,10 @@ from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.cut_in import _switch
 from painter.planning.deposition import half_axes, mean_film, predicted_film
 from painter.planning.film_cost import FilmCost, stroke_cost
-from painter.planning.film_fit import LEAST_FLOW, FilmFit, Span
+from painter.planning.film_fit import LEAST_FLOW, FilmFit
 from painter.planning.film_model import FilmModel, Site
 from painter.planning.raster import fitted_strokes, plan_strokes, raster_film
+from painter.planning.spans import Span
 from painter.planning.spray_cone import SprayCone, SpraySurface
 from painter.planning.spray_path import Stroke
 
