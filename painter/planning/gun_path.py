@@ -197,18 +197,21 @@ class SquareGun(FrozenValue):
             keeps[known] &= np.abs(torques) <= limits.effort_max
         return np.asarray(keeps.all(axis=1))
 
-    def joint_state(self, nozzle: MovingState) -> MovingState:
-        """Returns the joints' state for a nozzle in T at constant velocity.
+    def joint_states(self, *nozzles: MovingState) -> list[MovingState]:
+        """Returns the joints' states for nozzles in T at constant velocities.
 
         NaN where the arm does not reach. The rates are central differences.
         """
-        times = np.array([-_DIFFERENCE, 0.0, _DIFFERENCE])
-        before, q, after = self.solve(nozzle.x + times[:, None] * nozzle.v)
-        return MovingState(
-            q,
-            (after - before) / (2.0 * _DIFFERENCE),
-            (after - 2.0 * q + before) / _DIFFERENCE**2,
-        )
+        times = np.array([[-_DIFFERENCE], [0.0], [_DIFFERENCE]])
+        places = np.array([nozzle.x + times * nozzle.v for nozzle in nozzles])
+        return [
+            MovingState(
+                q,
+                (after - before) / (2.0 * _DIFFERENCE),
+                (after - 2.0 * q + before) / _DIFFERENCE**2,
+            )
+            for before, q, after in self.solve(places)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,6 +308,8 @@ def fastest_tool_blend(
 
 def _hop_height(s: FloatArray, hop: float, rise: float) -> FloatArray:
     """Returns the hop's height (n,), m, at shares `s` (n,): up, along, down again."""
+    if not hop:
+        return np.zeros_like(s)
 
     def smooth_step(u: FloatArray) -> FloatArray:
         u = np.clip(u, 0.0, 1.0)

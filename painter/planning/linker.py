@@ -214,8 +214,8 @@ class Linker(FrozenValue):
         """
         best: Segment | None = None
         if not hop:
-            states = self.gun.joint_state(start), self.gun.joint_state(end)
-            turn = fastest_joint_blend(*states, self.limits)
+            before, after = self.gun.joint_states(start, end)
+            turn = fastest_joint_blend(before, after, self.limits)
             if turn is not None and self.clear(turn):
                 best = turn
         for rise in _RISES if hop else _RISES[:1]:
@@ -246,9 +246,8 @@ class Linker(FrozenValue):
 
     def _blend(self, start: MovingState, end: MovingState) -> Segment:
         what = f"move from {_place(start)} to {_place(end)}"
-        blend = fastest_joint_blend(
-            self.gun.joint_state(start), self.gun.joint_state(end), self.limits
-        )
+        before, after = self.gun.joint_states(start, end)
+        blend = fastest_joint_blend(before, after, self.limits)
         if blend is None:
             raise ReachError(f"{what} leaves the arm's reach or its joint limits.")
         self.require_clear(blend, what=what)

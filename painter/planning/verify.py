@@ -110,50 +110,57 @@ def verify_strokes(
     times = [_dense(float(opens), float(closes)) for opens, closes in opened]
     if not times:
         return
-    q = motion.trajectory.vector_values(np.concatenate(times)).T
-    p_TGs, axes_T = _gun_in_tile(q, program.X_WT, kinematics)
-    ends = np.cumsum([len(time) for time in times])[:-1]
-    for number, (stroke, time, p_TG, axis_T) in enumerate(
-        zip(
-            program.strokes,
-            times,
-            np.split(p_TGs, ends),
-            np.split(axes_T, ends),
-            strict=True,
-        )
-    ):
-        opens, closes = opened[number]
-        along = (stroke.end_T - stroke.start_T) / stroke.length
-        ideal = stroke.start_T + np.outer((time - opens) * stroke.speed, along)
-        if surface is None:
-            cosine = -axis_T[:, 2]
-        else:
-            places = np.column_stack([ideal, np.full(len(ideal), stroke.standoff)])
-            wanted, normals = surface.points(places)
-            cosine = -np.sum(axis_T * normals, axis=1)
-            off = p_TG - wanted
-            before = np.sum(off * normals, axis=1)
-            p_TG = places + off - before[:, None] * normals
-            p_TG[:, 2] = stroke.standoff + before
-        off_axis_deg = np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0)))
-        step = time[1] - time[0]
-        speed = np.linalg.norm(np.diff(p_TG[:, :2], axis=0), axis=1) / step
-        end = stroke.start_T + along * stroke.speed * (closes - opens)
-        what = f"stroke {number + 1}"
-        for name, unit, values, bound in (
-            (
-                "speed error",
-                "m/s",
-                speed - stroke.speed,
-                _SPEED_TOLERANCE * stroke.speed,
-            ),
-            ("stand-off error", "m", p_TG[:, 2] - stroke.standoff, _STANDOFF_TOLERANCE),
-            ("gun angle", "deg", off_axis_deg, _ANGLE_TOLERANCE_DEG),
-            ("place across x", "m", p_TG[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
-            ("place along y", "m", p_TG[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
-            ("end", "m", end - stroke.end_T, _PLACE_TOLERANCE),
-        ):
-            _require_within(f"{what}: {name}", unit, time, values, bound)
+    time = np.concatenate(times)
+    lasts = np.cumsum([len(some) for some in times]) - 1
+    number = np.repeat(np.arange(len(times)), [len(some) for some in times])
+    q = motion.trajectory.vector_values(time).T
+    p_TG, axis_T = _gun_in_tile(q, program.X_WT, kinematics)
+    strokes = program.strokes
+    starts = np.array([stroke.start_T for stroke in strokes])
+    ends = np.array([stroke.end_T for stroke in strokes])
+    along = (ends - starts) / np.array([[stroke.length] for stroke in strokes])
+    speeds = np.array([stroke.speed for stroke in strokes])
+    standoff = np.array([stroke.standoff for stroke in strokes])[number]
+    gone = (time - opened[number, 0]) * speeds[number]
+    ideal = starts[number] + gone[:, None] * along[number]
+    if surface is None:
+        cosine = -axis_T[:, 2]
+    else:
+        places = np.column_stack([ideal, standoff])
+        wanted, normals = surface.points(places)
+        cosine = -np.sum(axis_T * normals, axis=1)
+        off = p_TG - wanted
+        before = np.sum(off * normals, axis=1)
+        p_TG = places + off - before[:, None] * normals
+        p_TG[:, 2] = standoff + before
+    off_axis_deg = np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    # The last place of a stroke has no next one; it counts with the one before.
+    nexts = np.arange(1, len(time) + 1)
+    nexts[lasts] = lasts
+    gaps = p_TG[nexts, :2] - p_TG[nexts - 1, :2]
+    speed = np.linalg.norm(gaps, axis=1) / (time[nexts] - time[nexts - 1])
+    lengths = speeds * np.diff(opened, axis=1)[:, 0]
+    reached = np.abs(starts + along * lengths[:, None] - ends).max(axis=1)
+    looks: list[tuple[str, str, FloatArray, FloatArray | float]] = [
+        (
+            "speed error",
+            "m/s",
+            speed - speeds[number],
+            _SPEED_TOLERANCE * speeds[number],
+        ),
+        ("stand-off error", "m", p_TG[:, 2] - standoff, _STANDOFF_TOLERANCE),
+        ("gun angle", "deg", off_axis_deg, _ANGLE_TOLERANCE_DEG),
+        ("place across x", "m", p_TG[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
+        ("place along y", "m", p_TG[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
+        ("end", "m", reached[number], _PLACE_TOLERANCE),
+    ]
+    within = [np.abs(values) <= bounds for _, _, values, bounds in looks]
+    for wrong in np.unique(number[~np.all(within, axis=0)]):
+        rows = number == wrong
+        for name, unit, values, bounds in looks:
+            some = np.broadcast_to(bounds, values.shape)[rows]
+            what = f"stroke {wrong + 1}: {name}"
+            _require_within(what, unit, time[rows], values[rows], some)
 
 
 def _extremes(

@@ -63,8 +63,8 @@ def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
     moves = linker.between(start, end)
     assert len(moves) == 1
     (turn,) = moves
-    np.testing.assert_allclose(start_q(turn), linker.gun.joint_state(start).x)
-    np.testing.assert_allclose(end_q(turn), linker.gun.joint_state(end).x)
+    np.testing.assert_allclose(start_q(turn), linker.gun.joint_states(start)[0].x)
+    np.testing.assert_allclose(end_q(turn), linker.gun.joint_states(end)[0].x)
     # The gun is square all along the turn: pitches and yaws add up to zero.
     q = turn.q(np.linspace(0.0, turn.duration, 100))
     np.testing.assert_allclose(q[:, 1:4].sum(axis=1), 0.0, atol=1e-6)
@@ -90,7 +90,7 @@ def test_the_quickest_clear_move_is_taken(robot, box):
             ]
             moves = [ToolMove(blend, linker.gun) for blend in blends if blend]
             if not hop:
-                states = linker.gun.joint_state(start), linker.gun.joint_state(end)
+                states = linker.gun.joint_states(start, end)
                 moves.append(fastest_joint_blend(*states, linker.limits))
             by_hop.append([move.duration for move in moves if linker.clear(move)])
         durations = next(durations for durations in by_hop if durations)

@@ -138,6 +138,36 @@ def test_verification_finds_a_stroke_that_is_out_of_time(robot, program):
         verify_strokes(late, kinematics=robot.kinematics, valve_delay=0.02)
 
 
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda s: {"speed": 1.03 * s.speed}, "speed error is 0.01"),
+        (lambda s: {"standoff": s.standoff + 0.003}, "stand-off error is 0.003"),
+        (
+            lambda s: {
+                "start_T": s.start_T + [0.003, 0],
+                "end_T": s.end_T + [0.003, 0],
+            },
+            "place across x is 0.003",
+        ),
+        (lambda s: {"end_T": s.part(0.0, 1.01).end_T}, "end is 0.0"),
+    ],
+)
+def test_verification_names_the_stroke_that_is_not_as_it_should(
+    robot, program, change, what
+):
+    number = next(k for k, s in enumerate(program.strokes, 1) if k > 2 and s.length > 1)
+    strokes = list(program.strokes)
+    wrong = strokes[number - 1]
+    strokes[number - 1] = wrong.replace(**change(wrong))
+    with pytest.raises(MotionLimitError, match=f"^stroke {number}: {what}"):
+        verify_strokes(
+            program.replace(strokes=tuple(strokes)),
+            kinematics=robot.kinematics,
+            valve_delay=0.02,
+        )
+
+
 def test_verification_finds_a_motion_that_is_too_fast(robot, program):
     motion = program.motion
     fast = Motion(motion.time / 2, motion.q, motion.v * 2, motion.spray_on / 2)
