@@ -174,6 +174,20 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
         q1: (5,) rad.
         limits: Of the joints, as far as the plan may use them.
     """
+    move = least_travel(q0, q1, limits)
+    # What gravity alone takes cannot be saved by going slower.
+    for _ in range(_SLOWER_STEPS):
+        if keeps_limits(move.q, move.duration, limits):
+            break
+        move = JointTravel(q0, q1, _SLOWER * move.speed_up, _SLOWER * move.cruise)
+    return move
+
+
+def least_travel(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTravel:
+    """Makes the move that rates and accelerations of the joints alone allow.
+
+    Torques and the nozzle's speed may want a slower one; see `rest_to_rest`.
+    """
     travel = np.abs(q1 - q0)
     # Of the whole way, by the joint that allows least: 1/s and 1/s².
     with np.errstate(divide="ignore"):
@@ -184,13 +198,7 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
     )
     speed_up = max(rate / ((1.0 - _TRAVEL_RAMP) * acceleration), 0.5 * _SHORTEST_MOVE)
     cruise = 1.0 / rate - speed_up
-    move = JointTravel(q0, q1, speed_up, cruise if cruise > _SHORTEST_CRUISE else 0.0)
-    # What gravity alone takes cannot be saved by going slower.
-    for _ in range(_SLOWER_STEPS):
-        if keeps_limits(move.q, move.duration, limits):
-            break
-        move = JointTravel(q0, q1, _SLOWER * move.speed_up, _SLOWER * move.cruise)
-    return move
+    return JointTravel(q0, q1, speed_up, cruise if cruise > _SHORTEST_CRUISE else 0.0)
 
 
 def fastest_joint_blend(

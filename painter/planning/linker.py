@@ -1,8 +1,9 @@
 """Gun-off moves between strokes, from rest and to rest, each checked for clearance."""
 
+import functools
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,12 @@ import numpy as np
 from painter.errors import CollisionError, PainterError, ReachError
 from painter.planning.blend import MovingState
 from painter.planning.gun_path import SquareGun, ToolMove, fastest_tool_blend
-from painter.planning.joint_motion import Segment, fastest_joint_blend, rest_to_rest
+from painter.planning.joint_motion import (
+    Segment,
+    fastest_joint_blend,
+    least_travel,
+    rest_to_rest,
+)
 from painter.planning.kinematics import ArmLimits
 from painter.planning.obstacles import ClearSpace
 from perception.values import FloatArray, FrozenValue
@@ -32,6 +38,16 @@ _ANCHORS = (
 )
 _DRAWN_BACK = (0.3, 0.2, 0.1)  # m from where the gun is, tried in turn.
 _DRAWN_OVER = (0.05, 0.10, 0.20)  # m, on the way from one rest to another.
+# The places that a transit goes over; see `Linker.transit`.
+_ROUTES = (
+    ("fold",),
+    ("unfold",),
+    ("fold", "unfold"),
+    ("back", "forth"),
+    ("back", "fold", "unfold"),
+    ("fold", "unfold", "forth"),
+    ("back", "fold", "unfold", "forth"),
+)
 _SQUARE = 1e-6  # rad, at most, by which the gun is off where it counts as square.
 
 
@@ -131,43 +147,50 @@ class Linker(FrozenValue):
             CollisionError: Every route comes too near to something; tells where the
                 direct one does.
         """
-        folds = [self._folded(float(q[0])) for q in (q0, q1)]
-        back, forth = self._drawn_back(q0), self._drawn_back(q1)
-        routes: tuple[list[FloatArray], ...] = (
-            [],
-            folds[:1],
-            folds[1:],
-            folds,
-            [*back, *forth],
-            [*back, *folds],
-            [*folds, *forth],
-            [*back, *folds, *forth],
-        )
-        known: dict[tuple[int, int], Segment] = {}
-        plans: list[list[Segment]] = []
-        for via in routes:
-            legs: list[Segment] = []
-            for a, b in itertools.pairwise([q0, *via, q1]):
-                # Routes share legs, and to check one for clearance takes time.
-                key = (id(a), id(b))
-                if key not in known:
-                    known[key] = rest_to_rest(a, b, self.limits)
-                legs.append(known[key])
-            plans.append(legs)
-        if not self.clear(plans[0][0]):
-            plans += [[move] for move in self._drawn_over(q0, q1)]
-        clear: dict[int, bool] = {}
-        for legs in sorted(plans, key=lambda legs: sum(leg.duration for leg in legs)):
-            for leg in legs:
-                if id(leg) not in clear:
-                    clear[id(leg)] = self.clear(leg)
-                if not clear[id(leg)]:
-                    break
-            else:
-                return legs
         direct = rest_to_rest(q0, q1, self.limits)
-        self.require_clear(direct, what="transit")
-        raise AssertionError("the direct route was not clear a moment ago")
+        best: list[Segment] = [direct] if self.clear(direct) else []
+        best = best or self._drawn_over(q0, q1)
+        places = {"start": q0, "end": q1}
+        for q, fold, back in ((q0, "fold", "back"), (q1, "unfold", "forth")):
+            places[fold] = self._folded(float(q[0]))
+            drawn = self._drawn_back(q)
+            if drawn is not None:
+                places[back] = drawn
+
+        # Routes share legs, and to check one for clearance takes time.
+        @functools.cache
+        def leg(a: str, b: str) -> Segment:
+            return rest_to_rest(places[a], places[b], self.limits)
+
+        @functools.cache
+        def clear(a: str, b: str) -> bool:
+            return self.clear(leg(a, b))
+
+        ways = [
+            list(
+                itertools.pairwise(["start", *filter(places.__contains__, via), "end"])
+            )
+            for via in _ROUTES
+        ]
+        least = [
+            sum(
+                least_travel(places[a], places[b], self.limits).duration for a, b in way
+            )
+            for way in ways
+        ]
+        for number in np.argsort(least, kind="stable"):
+            longest = _duration(best)
+            if least[number] >= longest:
+                break
+            moves = [leg(*pair) for pair in ways[number]]
+            if _duration(moves) < longest and all(
+                clear(*pair) for pair in ways[number]
+            ):
+                best = moves
+        if not best:
+            self.require_clear(direct, what="transit")
+            raise AssertionError("the direct route was not clear a moment ago")
+        return best
 
     def clear(self, segment: Segment) -> bool:
         """Returns whether a segment keeps its clearance all the way."""
@@ -193,18 +216,18 @@ class Linker(FrozenValue):
         return known
 
     def _drawn_over(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
-        """Returns moves of the square gun from rest to rest over a hop."""
+        """Returns the quickest clear move of the square gun over a hop, if any."""
         _, p_WGs = self.gun.kinematics.gun_poses(np.stack([q0, q1]))
         p_TGs = np.array([self.gun.place(p_WG) for p_WG in p_WGs])
         if not np.allclose(self.gun.solve(p_TGs), [q0, q1], atol=_SQUARE):
             return []
         start, end = (MovingState.at_rest(p_TG) for p_TG in p_TGs)
-        moves = [
-            self._tool_move(start, end, hop, rise)
-            for hop in _DRAWN_OVER
-            for rise in _RISES
-        ]
-        return [move for move in moves if move is not None]
+        best: list[Segment] = []
+        for hop, rise in itertools.product(_DRAWN_OVER, _RISES):
+            move = self._tool_move(start, end, hop, rise, _duration(best))
+            if move is not None and self.clear(move):
+                best = [move]
+        return best
 
     def _way(self, start: MovingState, end: MovingState, hop: float) -> Segment | None:
         """Returns the quickest clear blend: of the nozzle, or without hop of joints.
@@ -260,14 +283,14 @@ class Linker(FrozenValue):
         steps = np.unique(np.ceil(needed[needed > 0.0] / _HOP_STEP))
         return [0.0, *(steps * _HOP_STEP).tolist()]
 
-    def _drawn_back(self, q: FloatArray) -> list[FloatArray]:
+    def _drawn_back(self, q: FloatArray) -> FloatArray | None:
         """Returns the pose with the gun drawn farthest back from the wall, if any."""
         _, p_WGs = self.gun.kinematics.gun_poses(q[None])
         p_TG = self.gun.place(p_WGs[0])
         backs = self.gun.solve(p_TG + np.outer(_DRAWN_BACK, [0.0, 0.0, 1.0]))
         good = self.limits.contains(backs)
         good[good] = self.space.free(backs[good])
-        return [backs[int(np.argmax(good))]] if good.any() else []
+        return np.array(backs[np.argmax(good)]) if good.any() else None
 
     def _folded(self, yaw: float) -> FloatArray:
         """Returns the home pose turned to a yaw, the gun keeping its direction."""
@@ -291,6 +314,11 @@ def start_q(segment: Segment) -> FloatArray:
 def end_q(segment: Segment) -> FloatArray:
     """Returns the joint angles (5,) at a segment's end, rad."""
     return np.array(segment.q(np.array([segment.duration]))[0])
+
+
+def _duration(way: Sequence[Segment]) -> float:
+    """Returns how long a way takes, s; infinitely long if there is none."""
+    return sum(segment.duration for segment in way) if way else math.inf
 
 
 def _anchors(state: MovingState, sign: float) -> list[MovingState]:

@@ -1,12 +1,18 @@
 """Moves between strokes: over what stands in the way, or round it."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from painter.errors import CollisionError
 from painter.planning.blend import MovingState
 from painter.planning.gun_path import ToolMove, fastest_tool_blend
-from painter.planning.joint_motion import fastest_joint_blend, rest_to_rest
+from painter.planning.joint_motion import (
+    fastest_joint_blend,
+    least_travel,
+    rest_to_rest,
+)
 from painter.planning.linker import end_q, start_q
 from painter.planning.obstacles import ObstacleBox
 
@@ -108,6 +114,57 @@ def test_transit_goes_round_what_blocks_the_straight_way(robot):
     np.testing.assert_allclose(start_q(legs[0]), q0)
     np.testing.assert_allclose(end_q(legs[-1]), q1)
     assert all(linker.clear(leg) for leg in legs)
+
+
+@pytest.mark.parametrize("height", [0.0, 0.12, 0.3, 0.40])
+@pytest.mark.parametrize("y", [-0.1, 0.4, 1.0, 1.9])
+def test_transit_is_the_quickest_of_all_clear_ways(robot, height, y):
+    wall = ObstacleBox("rib", np.array([0.95, 0.0, 0.0]), np.array([1.05, 2.0, height]))
+    linker = robot.linker(wall)
+    q0, q1 = linker.gun.solve(np.array([[0.5, y, 0.18], [1.5, y, 0.3]]))
+    fold, unfold = (linker._folded(float(q[0])) for q in (q0, q1))
+    back, forth = (linker._drawn_back(q) for q in (q0, q1))
+    ways = [
+        [
+            rest_to_rest(a, b, linker.limits)
+            for a, b in itertools.pairwise([q0, *via, q1])
+        ]
+        for via in (
+            [],
+            [fold],
+            [unfold],
+            [fold, unfold],
+            [back, forth],
+            [back, fold, unfold],
+            [fold, unfold, forth],
+            [back, fold, unfold, forth],
+        )
+        if all(place is not None for place in via)
+    ]
+    assert len(ways) == 8
+    durations = [
+        sum(leg.duration for leg in way)
+        for way in ways
+        if all(linker.clear(leg) for leg in way)
+    ]
+    found = linker.transit(q0, q1)
+    assert all(linker.clear(leg) for leg in found)
+    duration = sum(leg.duration for leg in found)
+    if isinstance(found[0], ToolMove):
+        # Over a hop it goes where the straight way is not clear, if that is quicker.
+        assert not linker.clear(ways[0][0])
+        assert duration < min(durations)
+    else:
+        assert duration == min(durations)
+
+
+@pytest.mark.parametrize("travel", [0.01, 0.5, 2.0])
+def test_nothing_makes_a_way_quicker_than_rates_and_accelerations(robot, travel):
+    linker = robot.linker()
+    for q1 in linker.q_home + travel * np.random.default_rng(0).normal(size=(20, 5)):
+        least = least_travel(linker.q_home, q1, linker.limits)
+        real = rest_to_rest(linker.q_home, q1, linker.limits)
+        assert least.duration <= real.duration
 
 
 def test_gun_is_drawn_back_a_little_where_the_joints_straight_way_grazes(robot):
