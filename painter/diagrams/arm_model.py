@@ -9,11 +9,9 @@ from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JointActuator, RevoluteJoint, RigidBody
+from pydrake.multibody.tree import MultibodyForces
 from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
-from pydrake.systems.framework import Context
 
-from painter.planning.arm_dynamics import ArmDynamics
 from painter.planning.kinematics import ArmKinematics, ArmLimits
 from painter.resources import models_path
 from perception.values import FloatArray
@@ -25,13 +23,6 @@ JOINT_NAMES = (
     "wrist_pitch",
     "wrist_yaw",
 )
-# About which each turns at the arm's zero positions, in W.
-_AXES = [
-    np.array([0.0, 0.0, 1.0]),
-    *3 * [np.array([0.0, 1.0, 0.0])],
-    np.array([0.0, 0.0, 1.0]),
-]
-_AXIS_TOLERANCE = 1e-9
 # Model instances that move; the frame and whatever is added to W are surroundings.
 ROBOT_MODELS = ("arm", "gun", "camera")
 # The floor that the frame stands on, W z = 0.
@@ -108,81 +99,41 @@ def GetArmKinematics(plant: MultibodyPlant) -> ArmKinematics:
     )
 
 
-def GetArmDynamics(plant: MultibodyPlant) -> ArmDynamics:
-    """Reads masses, rotors and friction from the plant.
+class ArmTorques:
+    """What a motion takes of the joints: inverse dynamics of a plant.
 
-    Args:
-        plant: Finalised, in which the arm alone moves.
-
-    Raises:
-        ValueError: The robot is not the kind of arm that `ArmDynamics` describes.
+    Gravity, inertia with that of the rotors, and the joints' viscous friction.
     """
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, np.zeros(len(JOINT_NAMES)))
-    joints, drives = _JointsAndDrives(plant)
-    moved = [
-        set(plant.GetBodiesKinematicallyAffectedBy([joint.index()])) for joint in joints
-    ]
-    p_WJs, inertias = [], []
-    for joint, axis, those, beyond in zip(
-        joints, _AXES, moved, [*moved[1:], set()], strict=True
-    ):
-        X_WJ = joint.frame_on_parent().CalcPoseInWorld(context)
-        error = np.abs(X_WJ.rotation() @ joint.revolute_axis() - axis).max()
-        if error > _AXIS_TOLERANCE:
-            raise ValueError(
-                f"{joint.name()} must turn about {axis} at the arm's zero positions, "
-                f"its axis is off by {error:.2g}."
-            )
-        p_WJs.append(X_WJ.translation())
-        inertia = np.zeros((4, 4))
-        for body in map(plant.get_body, sorted(those - beyond)):
-            X_WB = body.EvalPoseInWorld(context).GetAsMatrix4()
-            inertia += X_WB @ _SecondMoments(body, context) @ X_WB.T
-        inertias.append(inertia)
-    return ArmDynamics.of_links(
-        np.array(p_WJs),
-        inertias,
-        gravity=-float(plant.gravity_field().gravity_vector()[2]),
-        damping=np.array([joint.default_damping() for joint in joints]),
-        rotor=np.array([drive.calc_reflected_inertia(context) for drive in drives]),
-    )
 
+    def __init__(self, plant: MultibodyPlant) -> None:
+        """Keeps a plant, finalised, in which the arm alone moves."""
+        self._plant = plant
+        self._context = plant.CreateDefaultContext()
+        self._forces = MultibodyForces(plant)
 
-def _SecondMoments(body: RigidBody, context: Context) -> FloatArray:
-    """Returns ∫ p p' over a body's mass (4, 4), p in its frame with a 1 appended."""
-    spatial = body.CalcSpatialInertiaInBodyFrame(context)
-    mass, p_BC = spatial.get_mass(), spatial.get_com()
-    about = spatial.CalcRotationalInertia().CopyToFullMatrix3()
-    moments = np.empty((4, 4))
-    moments[:3, :3] = np.trace(about) / 2.0 * np.eye(3) - about
-    moments[:3, 3] = moments[3, :3] = mass * p_BC
-    moments[3, 3] = mass
-    return moments
-
-
-def _JointsAndDrives(
-    plant: MultibodyPlant,
-) -> tuple[list[RevoluteJoint], list[JointActuator]]:
-    """Returns the arm's five joints and their drives, base yaw first."""
-    arm = plant.GetModelInstanceByName("arm")
-    return (
-        [plant.GetJointByName(name, arm) for name in JOINT_NAMES],
-        [plant.GetJointActuatorByName(name, arm) for name in JOINT_NAMES],
-    )
+    def __call__(self, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
+        """See `painter.planning.kinematics.TorqueModel`."""
+        plant, context, forces = self._plant, self._context, self._forces
+        torques = np.empty(q.shape)
+        for row, x in enumerate(np.hstack([q, v])):
+            plant.SetPositionsAndVelocities(context, x)
+            plant.CalcForceElementsContribution(context, forces)
+            torques[row] = plant.CalcInverseDynamics(context, a[row], forces)
+        return torques
 
 
 def GetArmLimits(plant: MultibodyPlant) -> ArmLimits:
     """Reads the limits of the five joints from the plant."""
-    joints, drives = _JointsAndDrives(plant)
-    alone = plant.num_velocities() == len(joints)
+    arm = plant.GetModelInstanceByName("arm")
+    joints = [plant.GetJointByName(name, arm) for name in JOINT_NAMES]
+    drives = [plant.GetJointActuatorByName(name, arm) for name in JOINT_NAMES]
     return ArmLimits(
         q_min=np.array([joint.position_lower_limits()[0] for joint in joints]),
         q_max=np.array([joint.position_upper_limits()[0] for joint in joints]),
         v_max=np.array([joint.velocity_upper_limits()[0] for joint in joints]),
         a_max=np.array([joint.acceleration_upper_limits()[0] for joint in joints]),
         effort_max=np.array([drive.effort_limit() for drive in drives]),
-        torques=GetArmDynamics(plant).torques if alone else None,
+        torques=ArmTorques(plant) if plant.num_velocities() == len(joints) else None,
     )
 
 
