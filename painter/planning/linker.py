@@ -104,7 +104,7 @@ class Linker(FrozenValue):
             failure: PainterError | None = None
             for anchor in _anchors(end, -1.0):
                 try:
-                    arrive = self._blend(anchor, end)
+                    arrive = self._blend(anchor, end, failure)
                     return [*self.transit(q, start_q(arrive)), arrive]
                 except (CollisionError, ReachError) as error:
                     failure = failure or error
@@ -120,7 +120,7 @@ class Linker(FrozenValue):
             failure: PainterError | None = None
             for anchor in _anchors(start, 1.0):
                 try:
-                    return [self._blend(start, anchor)]
+                    return [self._blend(start, anchor, failure)]
                 except (CollisionError, ReachError) as error:
                     failure = failure or error
             assert failure is not None
@@ -267,13 +267,25 @@ class Linker(FrozenValue):
         )
         return None if blend is None else ToolMove(blend, self.gun)
 
-    def _blend(self, start: MovingState, end: MovingState) -> Segment:
+    def _blend(
+        self, start: MovingState, end: MovingState, failure: PainterError | None
+    ) -> Segment:
+        """Joins two states by their joints; raises as `between` does.
+
+        What is wrong with this blend takes time to say; where there is a `failure` to
+        be told of already, that is raised once more.
+        """
         what = f"move from {_place(start)} to {_place(end)}"
         before, after = self.gun.joint_states(start, end)
         blend = fastest_joint_blend(before, after, self.limits)
         if blend is None:
-            raise ReachError(f"{what} leaves the arm's reach or its joint limits.")
-        self.require_clear(blend, what=what)
+            raise failure or ReachError(
+                f"{what} leaves the arm's reach or its joint limits."
+            )
+        if failure is None:
+            self.require_clear(blend, what=what)
+        elif not self.clear(blend):
+            raise failure
         return blend
 
     def _hops(self, standoff: float) -> list[float]:
