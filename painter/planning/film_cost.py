@@ -31,11 +31,12 @@ class _Weights(NamedTuple):
     dirty: tuple[float, float]
 
 
-# Chosen by benchmarks/bench_edges.py so that the named scenes keep clear of their
-# bounds. Beside openings the film can be even up to the edge, and evenness is what is
-# hard to get. Where things stand out their shade is uneven at any price, and what
-# evenness would cost is better spent on coverage.
-_OPENINGS = _Weights(10.0, 1.8, 1.2, 2.0, (0.95, 0.72), (0.06, 0.12))
+# Chosen by benchmarks/bench_edges.py, by plans from scans (bench_scanned_film.py) and
+# by whole cycles, so that the named scenes keep clear of their bounds. Beside openings
+# the film can be even up to the edge, and evenness is what is hard to get. Where things
+# stand out their shade is uneven at any price, and what evenness would cost is better
+# spent on coverage.
+_OPENINGS = _Weights(9.0, 1.65, 1.4, 1.8, (0.95, 0.72), (0.0625, 0.125))
 _THINGS = _Weights(1.0, 0.4, 0.5, 1.0, (0.88, 0.76), (0.05, 0.13))
 _BARE_WALL = _Weights(1.5, 0.9, 0.8, 1.0, (0.88, 0.76), (0.05, 0.13))
 _SOILED_MOST = 15.0  # That one soiled cell counts.

@@ -2,10 +2,13 @@
 
 Fitting varies one number of one stroke at a time (its place across, ends, flow and
 stand-off) and keeps what lowers the film's cost. Only the cells whose film changes are
-looked at, and what failed once is tried again only where the film has changed since.
+looked at. What failed once is tried again only if the slopes of the costs, as they are
+by then, promise something of it.
 """
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -21,20 +24,23 @@ from perception.values import BoolArray, FloatArray
 _STEPS = (
     (0.01, 0.01, 0.10, 0.03),
     (0.004, 0.005, 0.04, 0.01),
-    (0.0015, 0.003, 0.015, 0.004),
+    (0.0015, 0.002, 0.012, 0.003),
 )
+# And finest of all along openings, where they make the film even: in the shade of what
+# stands out it is uneven at any price.
+_FINEST = (0.0006, 0.001, 0.005, 0.001)
 _PASSES = 6  # At most, with steps of one size.
-_REPEATS = 4  # Of a step that helped.
+_REPEATS = 3  # Of a step that helped.
 # A shorter stroke need not lean: its ends move instead. Beyond 0.3 m/m, 17 deg, the
 # fan, which stays level, would be dragged too far along its own axis.
 _SHORTEST_LEANING = 0.15  # m
 MOST_LEAN = 0.3
 LEAST_FLOW = 0.08  # A valve does not dose less.
-_GAIN = 1e-6  # m², least gain of a step.
-# A step that failed is tried again once the film on its cells has changed by more than
-# its loss over this, all changes of all cells added up. Of 364 steps that helped at a
-# later try none would be missed with 2, ten with 1 and 20 with 1/2.
-_LOSS_FOR_CHANGE = 2.0
+_GAIN = 2e-6  # m², least gain of a step.
+# What slopes do not tell of a step's gain is taken for what they did not tell when it
+# failed, give or take this share.
+_DOUBT = 0.7
+_EITHER_SIDE = 0.015  # Film, as share of nominal, on which a cost's slope is taken.
 # The gun's half width and the clearance around it, m, and the clearance before it.
 _GUN_REACH = 0.07
 _GUN_FRONT = 0.05
@@ -42,20 +48,18 @@ _GUN_FRONT = 0.05
 _Step = tuple[str, float]  # A number of a span, and by how much it varies.
 
 
-class _Loss(NamedTuple):
-    """What a step lost when it was tried.
+class _Failure(NamedTuple):
+    """A step that was tried in vain.
 
     Attributes:
-        area: m²
-        window: The cells that it would have changed.
-        moved: By how much the film had changed there until then, m².
-        moved_in_all: And everywhere.
+        window: The cells whose film it would have changed.
+        change: And by how much, as share of nominal.
+        rest: Its gain less what the slopes of the costs told of it, m².
     """
 
-    area: float
     window: Window
-    moved: float
-    moved_in_all: float
+    change: FloatArray
+    rest: float
 
 
 class _Laid:
@@ -67,10 +71,9 @@ class _Laid:
         """Takes a span, its film on the cells that it reaches, and if it has room."""
         self.span, self.window, self.film = span, window, film
         self.has_room = has_room
-        # What steps lost that were tried in vain; None: they cannot be made.
-        self.failed: dict[_Step, _Loss | None] = {}
-        # What dropping it lost.
-        self.kept: _Loss | None = None
+        # Steps that were tried in vain; None: they cannot be made.
+        self.failed: dict[_Step, _Failure | None] = {}
+        self.kept: _Failure | None = None  # Dropping it.
 
 
 class FilmFit:
@@ -106,11 +109,9 @@ class FilmFit:
         self._tops = maximum_filter(site.height, size=size) + _GUN_FRONT
         self._tops[self._tops <= _GUN_FRONT] = 0.0  # The wall has its own clearance.
         self._tops = np.maximum(self._tops, site.nearest)
-        # While spans are fitted: what each cell costs, and by how much its film has
-        # changed, all changes added up.
+        # While spans are fitted: what each cell costs, and the slope of that.
         self._costs: FloatArray = np.zeros(site.wanted.shape)
-        self._moved: FloatArray = np.zeros(site.wanted.shape)
-        self._moved_in_all = 0.0  # The same of all cells, m².
+        self._slopes: FloatArray = np.zeros(site.wanted.shape)
 
     @property
     def spans(self) -> tuple[Span, ...]:
@@ -144,8 +145,12 @@ class FilmFit:
 
     def fit(self) -> None:
         """Varies the spans until nothing helps; drops those that are worth nothing."""
-        self._costs = self._cell_costs(self.film)
-        for across, along, flow, standoff in _STEPS:
+        everywhere = Window(*(slice(0, count) for count in self.film.shape))
+        self._change(everywhere, self.film, self._cell_costs(self.film))
+        site = self._model.site
+        has_openings = site.clean.any() and not site.stands_out
+        finest = (_FINEST,) if has_openings else ()
+        for across, along, flow, standoff in (*_STEPS, *finest):
             for _ in range(_PASSES):
                 changes = sum(
                     self._fit_span(index, across, along, flow, standoff)
@@ -163,7 +168,7 @@ class FilmFit:
         steps = [("x", across), ("low", along), ("high", along)]
         if span.standoff < self._raster.standoff:
             if span.length > _SHORTEST_LEANING:
-                steps.append(("lean", 2.0 * across / (span.length)))
+                steps.append(("lean", 2.0 * across / span.length))
             if standoff:
                 steps.append(("standoff", standoff))
         steps.append(("flow", flow * span.standoff / self._raster.standoff))
@@ -194,7 +199,7 @@ class FilmFit:
                 return None
         if not self.least_flow <= trial.flow <= 1.0 + 1e-9:
             return None
-        if trial.length < raster.min_stroke:
+        if trial.high - trial.low < raster.min_stroke:
             return None
         is_on_line = laid.has_room and name in ("flow", "low", "high")
         if is_on_line and trial.low >= span.low and trial.high <= span.high:
@@ -223,8 +228,8 @@ class FilmFit:
         """Takes a step of a span if that costs less."""
         laid = self._laid[index]
         if step in laid.failed:
-            last = laid.failed[step]
-            if last is None or self._still_loses(last):
+            failure = laid.failed[step]
+            if failure is None or self._is_hopeless(failure):
                 return False
         span, trial = laid.span, self._varied(laid, *step)
         if trial is None:
@@ -232,48 +237,49 @@ class FilmFit:
             return False
         name, size = step
         if name == "flow":
-            changed = laid.window
-            film = self.film[changed] - laid.film
-            film += laid.film * (trial.flow / span.flow)
+            window = laid.window
+            change = laid.film * (trial.flow / span.flow - 1.0)
         else:
             line, new = reached(self._model, trial)
-            changed = laid.window.hull(new)
+            old = laid.window
             if name in ("low", "high"):
                 # The film beyond the blur of the end that moves is as it was.
                 low, high = sorted((getattr(span, name), getattr(trial, name)))
                 rows = self._model.rows(low, high, span.standoff)
-                changed, new = changed.cut(rows), new.cut(rows)
-            film = self.film[changed].copy()
-            part = changed.part(film, laid.window)
-            part -= laid.window.part(laid.film, changed)
-            part = changed.part(film, new)
+                old, new = old.cut(rows), new.cut(rows)
+            window = old.hull(new)
+            change = np.zeros(window.shape)
+            part = window.part(change, new)
             part += span_film(self._model, trial, line, new)
-        costs = self._cell_costs(film, changed)
-        gain = float((self._costs[changed] - costs).sum()) * self._model.site.cell**2
+            part = window.part(change, old)
+            part -= laid.window.part(laid.film, old)
+        film = self.film[window] + change
+        costs = self._cell_costs(film, window)
+        gain = float((self._costs[window] - costs).sum()) * self._model.site.cell**2
         gain += stroke_cost(span.length) - stroke_cost(trial.length)
         if gain < _GAIN:
-            laid.failed[step] = self._loss(-gain, changed)
+            laid.failed[step] = self._failure(window, change, gain)
             return False
-        self._change(changed, film, costs)
-        laid = self._laid[index] = self._lay(trial, has_room=True)
+        self._change(window, film, costs)
+        laid = self._laid[index] = self._lay(trial, has_room=True, failed=laid.failed)
         # The step back would only undo this one.
-        laid.failed[name, -size] = self._loss(gain, changed)
+        laid.failed[name, -size] = self._failure(window, -change, -gain)
         return True
 
     def _drop(self) -> int:
         """Drops spans without which the film costs no more; returns how many."""
         kept: list[_Laid] = []
         for laid in self._laid:
-            if laid.kept is None or not self._still_loses(laid.kept):
+            if laid.kept is None or not self._is_hopeless(laid.kept):
                 film = self.film[laid.window] - laid.film
                 costs = self._cell_costs(film, laid.window)
-                loss = float((costs - self._costs[laid.window]).sum())
-                loss *= self._model.site.cell**2
-                loss -= stroke_cost(laid.span.length)
-                if loss < 0.0:
+                gain = float((self._costs[laid.window] - costs).sum())
+                gain *= self._model.site.cell**2
+                gain += stroke_cost(laid.span.length)
+                if gain > 0.0:
                     self._change(laid.window, film, costs)
                     continue
-                laid.kept = self._loss(loss, laid.window)
+                laid.kept = self._failure(laid.window, -laid.film, gain)
             kept.append(laid)
         dropped = len(self._laid) - len(kept)
         self._laid = kept
@@ -281,25 +287,33 @@ class FilmFit:
 
     def _change(self, window: Window, film: FloatArray, costs: FloatArray) -> None:
         """Takes over a film and its costs on a window."""
-        moved = np.abs(film - self.film[window])
-        self._moved[window] += moved
-        self._moved_in_all += float(moved.sum()) * self._model.site.cell**2
         self.film[window], self._costs[window] = film, costs
+        above = self._cell_costs(film + _EITHER_SIDE, window)
+        below = self._cell_costs(film - _EITHER_SIDE, window)
+        self._slopes[window] = (above - below) / (2.0 * _EITHER_SIDE)
 
-    def _loss(self, area: float, window: Window) -> _Loss:
-        return _Loss(area, window, self._moved_on(window), self._moved_in_all)
+    def _failure(self, window: Window, change: FloatArray, gain: float) -> _Failure:
+        return _Failure(window, change, gain - self._promise(window, change))
 
-    def _still_loses(self, last: _Loss) -> bool:
-        """Tells that the film has changed too little for a step to help now."""
-        moved = self._moved_in_all - last.moved_in_all
-        if last.area >= _LOSS_FOR_CHANGE * moved:
-            return True  # Not even if all of it was there, which is soon told.
-        moved = self._moved_on(last.window) - last.moved
-        return last.area >= _LOSS_FOR_CHANGE * moved
+    def _promise(self, window: Window, change: FloatArray) -> float:
+        """Returns what a change of the film gains by the slopes of the costs, m²."""
+        rise = float(np.einsum("ij,ij", self._slopes[window], change))
+        return -rise * self._model.site.cell**2
 
-    def _moved_on(self, window: Window) -> float:
-        return float(self._moved[window].sum()) * self._model.site.cell**2
+    def _is_hopeless(self, failure: _Failure) -> bool:
+        """Tells that what failed would still gain nothing, as far as slopes tell."""
+        gain = self._promise(failure.window, failure.change) + failure.rest
+        return gain + _DOUBT * abs(failure.rest) < _GAIN
 
-    def _lay(self, span: Span, has_room: bool) -> _Laid:
+    def _lay(
+        self,
+        span: Span,
+        has_room: bool,
+        failed: Mapping[_Step, _Failure | None] = MappingProxyType({}),
+    ) -> _Laid:
+        """Returns a span with its film; `failed` is what did with almost the same."""
         line, window = reached(self._model, span)
-        return _Laid(span, window, span_film(self._model, span, line, window), has_room)
+        film = span_film(self._model, span, line, window)
+        laid = _Laid(span, window, film, has_room)
+        laid.failed = {step: why for step, why in failed.items() if why is not None}
+        return laid

@@ -238,7 +238,9 @@ def covered(strokes):
     """Lengths of wall that are sprayed, by line and stand-off."""
     lengths = {}
     for stroke in strokes:
-        key = round(float(stroke.start_T[0]), 6), stroke.standoff
+        (x, y), along = stroke.start_T, stroke.end_T - stroke.start_T
+        foot = float(x - along[0] / along[1] * y)  # A stroke may lean a little.
+        key = round(foot, 6), stroke.standoff
         lengths[key] = lengths.get(key, 0.0) + stroke.flow * stroke.length
     return lengths
 
