@@ -15,7 +15,7 @@ SYSTEM_PACKAGES := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libgomp1 libusb-1
 # These measure what is found, not how fast, in hours.
 LONG_BENCHES := $(patsubst %,benchmarks/bench_%.py,\
   edge_bound edges fine_steps hil low_plates map map_recordings masks masks_pcl \
-  scanned_film)
+  misplaced scanned_film)
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
 .PHONY: help setup browser demo test test-all test-socketcan lint format bench bench-all \
@@ -111,7 +111,7 @@ run_benches() {
   local failed=()
   for file in "$$@"; do
     echo "== $$file"
-    $(BIN)/python "$$file" || failed+=("$$file")
+    PYTHONPATH=$(CURDIR) $(BIN)/python "$$file" || failed+=("$$file")
   done
   if [ $${#failed[@]} -gt 0 ]; then echo "failed: $${failed[*]}" >&2; return 1; fi
 }

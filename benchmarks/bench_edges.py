@@ -62,7 +62,9 @@ class Edges:
 def main() -> None:
     """Prints the table and draws the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True, help="folder of the picture")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/edges"), help="folder of the picture"
+    )
     parser.add_argument("--scene", default="terrace", help="a named scene")
     arguments = parser.parse_args()
     field = height_field(load_scene(arguments.scene, 1), cell=CELL)

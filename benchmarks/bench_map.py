@@ -60,13 +60,27 @@ STEP = 0.01
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rows", nargs="*", default=list(ROWS)[:-1], choices=list(ROWS))
+    parser.add_argument(
+        "rows",
+        nargs="*",
+        type=known_row,
+        default=list(ROWS)[:-1],
+        metavar="ROW",
+        help=f"one of {', '.join(ROWS)}; all but the last unless given",
+    )
     parser.add_argument("--rate", type=float, default=5.0, help="frames a second, Hz")
     parser.add_argument("--scans", type=int, default=1, help="times over the wall")
     parser.add_argument("--seed", type=int, default=7, help="of noise and errors")
     words = parser.parse_args()
     for row in words.rows:
         run_row(row, words.rate, words.scans, words.seed)
+
+
+def known_row(name: str) -> str:
+    """Returns a row's name; argparse itself would refuse the default for no choice."""
+    if name not in ROWS:
+        raise argparse.ArgumentTypeError(f"{name!r} is not one of {', '.join(ROWS)}")
+    return name
 
 
 def run_row(row: str, rate: float, scans: int, seed: int) -> None:

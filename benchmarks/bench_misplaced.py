@@ -30,7 +30,9 @@ CYCLE_TIME = 150.0
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/misplaced"), help="folder of the runs"
+    )
     parser.add_argument("--scenes", nargs="*", default=[*SCENES, "random"])
     parser.add_argument(
         "--sign", type=float, default=1.0, help="-1 = all errors turned"
