@@ -36,7 +36,8 @@ TIP = TipConfig()
 COVERED, SOILED = 0.8, 0.1
 STANDOFFS = (0.30, 0.20, 0.10, 0.08, 0.06)  # m, of the strokes beside edges.
 FLOWS = (1.0, 1.25, 1.5)  # Peak of such a stroke's film, as share of nominal.
-WEIGHTS = (0.7, 1.4, 2.8)  # Of soiled cells; the planner's own is 1.4.
+# Of soiled cells: half of the planner's own weight, that, and twice as much.
+WEIGHTS = tuple(share * film_cost._OPENINGS.soiled for share in (0.5, 1.0, 2.0))
 ASKED = {"terrace": (0.96, 0.03), "room": (0.96, 0.03)}  # Coverage, keepout_paint.
 
 

@@ -253,9 +253,7 @@ class FilmFit:
             part += span_film(self._model, trial, line, new)
             part = window.part(change, old)
             part -= laid.window.part(laid.film, old)
-        film = self.film[window] + change
-        costs = self._cell_costs(film, window)
-        gain = float((self._costs[window] - costs).sum()) * self._model.site.cell**2
+        film, costs, gain = self._weigh(window, change)
         gain += stroke_cost(span.length) - stroke_cost(trial.length)
         if gain < _GAIN:
             laid.failed[step] = self._failure(window, change, gain)
@@ -271,19 +269,26 @@ class FilmFit:
         kept: list[_Laid] = []
         for laid in self._laid:
             if laid.kept is None or not self._is_hopeless(laid.kept):
-                film = self.film[laid.window] - laid.film
-                costs = self._cell_costs(film, laid.window)
-                gain = float((self._costs[laid.window] - costs).sum())
-                gain *= self._model.site.cell**2
+                window, change = laid.window, -laid.film
+                film, costs, gain = self._weigh(window, change)
                 gain += stroke_cost(laid.span.length)
                 if gain > 0.0:
-                    self._change(laid.window, film, costs)
+                    self._change(window, film, costs)
                     continue
-                laid.kept = self._failure(laid.window, -laid.film, gain)
+                laid.kept = self._failure(window, change, gain)
             kept.append(laid)
         dropped = len(self._laid) - len(kept)
         self._laid = kept
         return dropped
+
+    def _weigh(
+        self, window: Window, change: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Returns the film with a change, its costs, and what they are less, m²."""
+        film = self.film[window] + change
+        costs = self._cell_costs(film, window)
+        gain = float((self._costs[window] - costs).sum()) * self._model.site.cell**2
+        return film, costs, gain
 
     def _change(self, window: Window, film: FloatArray, costs: FloatArray) -> None:
         """Takes over a film and its costs on a window."""
