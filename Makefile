@@ -12,8 +12,9 @@ STAMP := $(VENV)/.installed
 PYTHON ?= python3 python3.13 python3.12 python3.11
 SYSTEM_PACKAGES := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libgomp1 libusb-1.0-0 \
   libx11-6
+BENCHES := $(patsubst benchmarks/%.py,%,$(wildcard benchmarks/bench_*.py))
 # These measure what is found, not how fast, in hours.
-LONG_BENCHES := $(patsubst %,benchmarks/bench_%.py,\
+LONG_BENCHES := $(addprefix bench_,\
   edge_bound edges fine_steps hil low_plates map map_recordings masks masks_pcl \
   misplaced scanned_film)
 PYTEST_ARGS ?= -n 2 --dist loadfile
@@ -109,9 +110,9 @@ format: setup ## Format the code, fix what can be fixed, strip notebooks
 define run_benches
 run_benches() {
   local failed=()
-  for file in "$$@"; do
-    echo "== $$file"
-    PYTHONPATH=$(CURDIR) $(BIN)/python "$$file" || failed+=("$$file")
+  for bench in "$$@"; do
+    echo "== $$bench"
+    $(BIN)/python -m "benchmarks.$$bench" || failed+=("$$bench")
   done
   if [ $${#failed[@]} -gt 0 ]; then echo "failed: $${failed[*]}" >&2; return 1; fi
 }
@@ -119,7 +120,7 @@ endef
 
 bench: setup ## Measure the speed of single stages (a quarter of an hour)
 	@$(run_benches)
-	run_benches $(filter-out $(LONG_BENCHES),$(wildcard benchmarks/bench_*.py))
+	run_benches $(filter-out $(LONG_BENCHES),$(BENCHES))
 
 bench-all: bench ## Measure masks, maps and recordings too (hours)
 	@$(run_benches)

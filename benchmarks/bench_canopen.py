@@ -1,6 +1,6 @@
 """Timing of the bus process against simulated drives in another process.
 
-Run `python benchmarks/bench_canopen.py`; SCHED_FIFO needs root or RLIMIT_RTPRIO, else
+Run `python -m benchmarks.bench_canopen`; SCHED_FIFO needs root or RLIMIT_RTPRIO, else
 the loop warns and the figures are those of a plain thread. Five drives and the I/O node
 at 200 Hz over a local socket, once alone and once while another process segments a wall
 of 500,000 points and plans its strokes, over and over. Compare figures within one run

@@ -1,6 +1,6 @@
 """Planning time of a 10 x 6 m facade of stations, one core, without the first import.
 
-Run `python benchmarks/bench_facade.py`. Every station's tile is bare; its program is
+Run `python -m benchmarks.bench_facade`. Every station's tile is bare; its program is
 planned and verified as one of a single tile is. Joints: predicted film, least and most
 over the nominal one, farther than 15 cm from the wall's own edges, with every second
 station where it should be and 5 mm off.

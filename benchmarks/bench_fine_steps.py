@@ -8,7 +8,7 @@ the plate's edges too, of all other cells. The first table is of plates whose ed
 on the grid's lines, the second of plates shifted by parts of a cell: there the mask
 must tell an edge 2.5 mm beside a cell's centre from one on it.
 
-    python benchmarks/bench_fine_steps.py [PICTURE.png]
+    python -m benchmarks.bench_fine_steps [PICTURE.png]
 
 Prints the tables and draws the first.
 """

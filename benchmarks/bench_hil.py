@@ -1,6 +1,6 @@
 """A paint cycle over the bus beside the same one in the simulated station.
 
-`python benchmarks/bench_hil.py` starts `painter drives --scenario` and
+`python -m benchmarks.bench_hil` starts `painter drives --scenario` and
 `painter deploy` as processes of their own, lets them paint, and compares the figures
 with those of `painter simulate`. Exit status 1 if one differs by more than 10 %. Four
 processes at once: on two cores take `--rate 0.5`, which gives all of them twice the

@@ -6,7 +6,7 @@ millimetre; the wall is off by up to 1 cm and 0.5 degrees. It is looked at, scan
 from 0.7 m and segmented in full simulation. A cell is a plate's if a ray through its
 centre meets it; false cells are cells of wall that are lost, at the edges too.
 
-    python benchmarks/bench_low_plates.py [SEEDS]
+    python -m benchmarks.bench_low_plates [SEEDS]
 """
 
 import sys
@@ -14,9 +14,9 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from scanned_scenes import scan_and_segment
 from scipy import ndimage
 
+from benchmarks.scanned_scenes import scan_and_segment
 from painter.config import load_scenario
 from painter.scene import SurfaceKind
 

@@ -1,6 +1,6 @@
 """The map accumulator on rendered walls and recordings, row by row of issue 6.
 
-`python benchmarks/bench_map.py [ROW ...] [--rate HZ] [--scans N] [--seed N]`; rows:
+`python -m benchmarks.bench_map [ROW ...] [--rate HZ] [--scans N] [--seed N]`; rows:
 textured, textured-no-arm, painted, window, blank, blank-no-arm, wrong-links, memory;
 without names all but memory.
 Sequences: 848 x 480 through the D435 model, 0.7 m from the wall, zig-zag of five rows

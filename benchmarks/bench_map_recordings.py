@@ -11,8 +11,8 @@ import os
 from pathlib import Path
 
 import numpy as np
-from bench_map import ate
 
+from benchmarks.bench_map import ate
 from perception.mapping.config import MapperConfig
 from perception.mapping.frames import open_recording
 from perception.mapping.mapper import Mapper

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import matplotlib.image
 import numpy as np
-from scanned_scenes import ScannedScene, scan_and_segment
 from scipy import ndimage
 
+from benchmarks.scanned_scenes import ScannedScene, scan_and_segment
 from painter.config import load_scenario
 from painter.run.mask_figures import edge_errors, mask_iou
 from painter.scene import SurfaceKind, is_paintable

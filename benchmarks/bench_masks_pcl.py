@@ -6,7 +6,7 @@ of the paper's steps, of `segment_wall` and of PCL's `pcl_wall`; and by how much
 `segment_wall` is ahead of PCL on one and the same cloud. The truth is what lies at the
 centres of cells, by geometry.
 
-    python benchmarks/bench_masks_pcl.py [POINTS ...] [--peer PATH] [--seeds N]
+    python -m benchmarks.bench_masks_pcl [POINTS ...] [--peer PATH] [--seeds N]
 
 --peer or the variable PCL_WALL says where `pcl_wall` is; without it PCL is left out.
 """
@@ -17,8 +17,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from wall_peers import Peer
 
+from benchmarks.wall_peers import Peer
 from perception.config import SegmentationConfig
 from perception.furnished_wall import EDGE, FurnishedWall, Thing, furnished_wall
 from perception.segmentation import find_planes, segment_tile, segment_wall

@@ -13,7 +13,7 @@ PCL's part is a program of its own; where it is comes from --peer or the variabl
 PCL_WALL. Without it, that part is left out, as are both peers on clouds of over a
 million points, which take PCL 40 s. The whole takes about six minutes on two cores.
 
-    python benchmarks/bench_segmentation.py [POINTS ...] [--peer PATH] [--repeats N]
+    python -m benchmarks.bench_segmentation [POINTS ...] [--peer PATH] [--repeats N]
 """
 
 import argparse
@@ -26,8 +26,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from wall_peers import OPTIONS, STEPS, Peer, Times, time_open3d, timed
 
+from benchmarks.wall_peers import OPTIONS, STEPS, Peer, Times, time_open3d, timed
 from perception.config import SegmentationConfig
 from perception.filters import morton_codes
 from perception.furnished_wall import EDGE, FurnishedWall, Thing, furnished_wall

@@ -1,6 +1,6 @@
 """Strokes side by side: a plain raster, lines placed for edges, cut in, in two coats.
 
-Run `python benchmarks/bench_strokes.py [SCENE ...]`. The masks are exact and the gun is
+Run `python -m benchmarks.bench_strokes [SCENE ...]`. The masks are exact and the gun is
 where it should be: what a simulated cycle gives is this less the errors of map, base
 and arm. Film is that of `FilmModel`, shaded by what stands out; spray beyond the tile's
 edge is overspray too. Time is the strokes' and the estimated moves' between them.
