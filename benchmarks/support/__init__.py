@@ -1,0 +1,1 @@
+"""What benchmarks share, and scripts that compare one state of the code with another."""
