@@ -12,11 +12,11 @@ STAMP := $(VENV)/.installed
 PYTHON ?= python3 python3.13 python3.12 python3.11
 SYSTEM_PACKAGES := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libgomp1 libusb-1.0-0 \
   libx11-6
-BENCHES := $(patsubst benchmarks/%.py,%,$(wildcard benchmarks/bench_*.py))
-# These measure what is found, not how fast, in hours.
-LONG_BENCHES := $(addprefix bench_,\
-  edge_bound edges fine_steps hil low_plates map map_recordings masks masks_pcl \
-  misplaced scanned_film)
+# `speed` takes a quarter of an hour, `findings` (what is found, not how fast) hours.
+BENCHES := $(addprefix speed.,canopen_timing facade mapping planner segmentation) \
+  findings.strokes
+LONG_BENCHES := $(addprefix findings.,edge_bound edges fine_steps hil low_plates \
+  map_recordings map_sessions masks masks_pcl misplaced scanned_film)
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
 .PHONY: help setup browser demo test test-all test-socketcan lint format bench bench-all \
@@ -120,7 +120,7 @@ endef
 
 bench: setup ## Measure the speed of single stages (a quarter of an hour)
 	@$(run_benches)
-	run_benches $(filter-out $(LONG_BENCHES),$(BENCHES))
+	run_benches $(BENCHES)
 
 bench-all: bench ## Measure masks, maps and recordings too (hours)
 	@$(run_benches)

@@ -24,12 +24,8 @@ from painter.planning.config import (
     TipConfig,
 )
 from painter.resources import models_path
-from perception.config import (
-    MapConfig,
-    SegmentationConfig,
-    StereoConfig,
-    check_positive,
-)
+from perception.config import MapConfig, SegmentationConfig, StereoConfig
+from perception.ground import check_positive
 from perception.mapping.config import PoseGraphConfig
 
 

@@ -5,22 +5,8 @@ Plain mutable dataclasses, because Drake's `yaml_load_typed` fills them field by
 """
 
 import dataclasses
-import math
 
-
-def check_positive(owner: str, **values: float) -> None:
-    """Raises if a value is not a finite number above zero.
-
-    Args:
-        owner: What the fields belong to, for the message.
-        values: Field names and values.
-
-    Raises:
-        ValueError: A value is not finite or not > 0; names the field and the value.
-    """
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{owner}.{name} must be > 0, got {value!r}.")
+from perception.ground import check_positive
 
 
 @dataclasses.dataclass(kw_only=True)

@@ -2,38 +2,13 @@
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
-
-
-class FrozenValue:
-    """Base of frozen dataclasses that travel on ports or live in a Context.
-
-    Drake deep-copies the Python state of a system around its unrestricted updates and
-    passes references along ports, so a value never changes: its arrays are made
-    read-only and a copy is the value itself.
-    """
-
-    def __post_init__(self) -> None:
-        """Makes every array field read-only."""
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-
-    def __deepcopy__(self, memo: dict[int, object]) -> Self:
-        """Returns the value itself: it cannot change."""
-        return self
-
-    def replace(self, **changes: Any) -> Self:
-        """Returns a copy with some fields exchanged."""
-        return dataclasses.replace(self, **changes)  # type: ignore[type-var]
+from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +99,7 @@ class WallSegmentation(FrozenValue):
             paper's steps alone; so are the fields below.
         normals: (ny, nx, 3) float32, unit, in T: the normals of that surface.
         confidence: (ny, nx) float32, 0 to 1: how sure each cell of the mask is.
-        reason: (ny, nx) uint8, values of `perception.unseen.Reason`.
+        reason: (ny, nx) uint8, values of `perception.fine_steps.unseen.Reason`.
         openings: Windows, doors and niches, the largest first.
     """
 

@@ -10,15 +10,15 @@ import numpy as np
 
 from painter.camera.frames import CameraFrame
 from painter.camera.reader import CameraHealth, CameraState, Reading
-from painter.canopen.bus_file import load_bus
-from painter.canopen.feedback import Phase
-from painter.canopen.robot_clock import RobotClock
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.master.feedback import Phase
+from painter.canopen.process.robot_clock import RobotClock
 from painter.canopen.sim.lockstep import LockstepBus
 from painter.canopen.sim.rack import Rack
 from painter.config import Scenario, load_scenario
-from painter.diagrams.arm_load import ArmLoad
 from painter.diagrams.hardware_station import Body
-from painter.diagrams.sim_world import SimWorld
+from painter.rehearsal.arm_load import ArmLoad
+from painter.rehearsal.sim_world import SimWorld
 from painter.resources import models_path
 
 WORLD_PERIOD = 0.01

@@ -1,1 +1,1 @@
-"""What benchmarks share, and scripts that compare one state of the code with another."""
+"""What benchmarks share, and scripts that compare two states of the code."""

@@ -2,8 +2,8 @@
 
 Run `python -m benchmarks.support.program_hashes --out FILE` before a change and
 `... --compare FILE` after it; the exit status is 1 if anything differs. Programs are
-those of all named scenes and of random seeds 1 to 20, on exact masks with noisy heights;
-segmentations are those of furnished walls.
+those of all named scenes and of random seeds 1 to 20, on exact masks with noisy
+heights; segmentations are those of furnished walls.
 """
 
 import argparse
@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.bench_planner import wall_of
+from benchmarks.speed.planner import wall_of
 from painter.config import load_scenario
-from painter.diagrams.program_planner import MakeProgramPlanner
+from painter.robot.planners import MakeProgramPlanner
 from perception.config import SegmentationConfig
-from perception.furnished_wall import EDGE, furnished_wall
 from perception.segmentation import segment_wall
+from perception.synthetic.furnished_wall import EDGE, furnished_wall
 
 SCENES = (
     "blank",

@@ -22,7 +22,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
-from painter.diagrams.arm_model import AddRobot, GetArmKinematics, MakeArmPlant
+from painter.robot.arm_model import AddRobot, GetArmKinematics, MakeArmPlant
 
 CELL = "package://painter_models/painter_cell.dmd.yaml"
 WALL_DISTANCE = 1.05

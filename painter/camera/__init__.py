@@ -1,1 +1,4 @@
-"""The robot's depth camera: librealsense, its clock, and what happens when it goes."""
+"""The robot's depth camera through librealsense, its clock, and what if it goes.
+
+No Drake; pictures leave as NumPy arrays.
+"""

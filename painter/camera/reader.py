@@ -13,7 +13,7 @@ from painter.camera.config import CameraDriverConfig
 from painter.camera.frames import Camera, CameraError, CameraFrame, FrameSource
 from painter.errors import InputError
 from painter.timebase import TimeBase
-from perception.depth import CameraIntrinsics
+from perception.depth_camera.depth import CameraIntrinsics
 
 _LOGGER = logging.getLogger(__name__)
 _WAIT = 0.1

@@ -16,8 +16,8 @@ import pyrealsense2 as rs
 
 from painter.camera.config import CameraDriverConfig
 from painter.camera.frames import CameraError, CameraFrame, ColorArray
-from perception.depth import CameraIntrinsics
-from perception.pinhole import PinholeMap
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.depth_camera.pinhole import PinholeMap
 
 _LOGGER = logging.getLogger(__name__)
 _QUEUE = 4

@@ -10,7 +10,7 @@ import pyrealsense2 as rs
 from painter.camera.config import CameraDriverConfig
 from painter.camera.frames import CameraError, CameraFrame, FrameSource
 from painter.camera.realsense import RealSense
-from perception.depth import CameraIntrinsics
+from perception.depth_camera.depth import CameraIntrinsics
 
 _DEPTH_UNIT = 0.001
 

@@ -18,13 +18,13 @@ from painter.cli.common import (
     print_result,
 )
 from painter.config import load_scenario
-from painter.diagrams.arm_model import GetArmKinematics, MakeArmPlant
 from painter.errors import InputError
-from painter.planning.kinematics import ArmKinematics
-from perception.mapping.charuco import BoardConfig, calibrate_on_board
-from perception.mapping.frames import Frame, Recording, open_recording
-from perception.mapping.hand_eye import calibrate_on_wall
-from perception.values import FloatArray
+from painter.planning.arm.kinematics import ArmKinematics
+from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
+from perception.ground import FloatArray
+from perception.io.frames import Frame, Recording, open_recording
+from perception.mapping.calibration.charuco import BoardConfig, calibrate_on_board
+from perception.mapping.calibration.hand_eye import calibrate_on_wall
 
 JOINTS_FILE = "joints.txt"
 RESULT_FILE = "calibration.json"

@@ -7,11 +7,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from painter.canopen.bus_config import BusConfig
-from painter.canopen.bus_file import load_bus
-from painter.canopen.candump import LogRecord, read_lines, read_log
-from painter.canopen.decoder import Decoded, Decoder, Kind
-from painter.canopen.log_summary import LogSummary
+from painter.canopen.analysis.decoder import Decoded, Decoder, Kind
+from painter.canopen.analysis.log_summary import LogSummary
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.wire.candump import LogRecord, read_lines, read_log
 from painter.cli.common import JsonOption, output_folder, print_result
 from painter.errors import InputError
 from painter.resources import models_path
@@ -103,11 +103,11 @@ def canlog(
 def _replay(log: Path, bus: BusConfig, folder: Path) -> dict[str, object]:
     """Plays a log into the diagram; returns its figures."""
     # Drake is loaded for this alone.
-    from painter.canopen.log_bus import LogBus
+    from painter.canopen.analysis.log_bus import LogBus
     from painter.config import Scenario
-    from painter.diagrams.log_replay import ReplayLog
-    from painter.run.arrays import save_executed
-    from painter.run.values import Executed
+    from painter.cycle.log_replay import ReplayLog
+    from painter.run.folder.arrays import save_executed
+    from painter.run.folder.values import Executed
 
     try:
         played = LogBus(bus, read_log(log).records)

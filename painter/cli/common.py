@@ -75,6 +75,25 @@ def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
         typer.echo(f"{name:<{width}}  {text}")
 
 
+def print_summary(figures: dict, out: Path) -> None:
+    """Prints the figures of a run that matter most."""
+    names = (
+        "result",
+        "motion_time_s",
+        "mask_iou",
+        "coverage",
+        "thickness_cv_interior",
+        "overspray",
+        "keepout_paint",
+        "collisions",
+    )
+    summary = {name: figures[name] for name in names if figures.get(name) is not None}
+    summary |= {
+        name: figures["timing"][name] for name in ("cycle_time_s", "wall_clock_s")
+    }
+    print_result(summary | {"report": str(out / "report.html")}, as_json=False)
+
+
 IncludeOption = Annotated[
     list[str] | None,
     typer.Option(

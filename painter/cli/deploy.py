@@ -12,34 +12,35 @@ import typer
 
 from painter.camera.frame_link import FrameLink
 from painter.camera.reader import CameraReader, camera_opener
-from painter.canopen.bus_config import BusConfig
-from painter.canopen.bus_file import load_bus
-from painter.canopen.bus_process import BusProcess
-from painter.canopen.realtime import prefer
-from painter.canopen.robot_clock import RobotClock
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.process.bus_process import BusProcess
+from painter.canopen.process.realtime import prefer
+from painter.canopen.process.robot_clock import RobotClock
 from painter.cli.common import (
     JsonOption,
     RateOption,
     ScenarioArgument,
     SetOption,
     print_result,
+    print_summary,
     progress,
     versions,
 )
-from painter.cli.run_log import event_watch, print_summary, write_log
-from painter.cli.step_by_step import StepByStep
 from painter.config import Scenario, dump_scenario, load_scenario
-from painter.diagrams.deployment import DeployCycle
+from painter.cycle.deploy import DeployCycle
+from painter.cycle.preflight import preflight
+from painter.cycle.step_by_step import StepByStep
+from painter.cycle.write_run import event_watch, write_log
 from painter.diagrams.hardware_station import Body
-from painter.diagrams.preflight import preflight
 from painter.errors import BusError, FaultError, InputError, PainterError
 from painter.resources import models_path
-from painter.run.folder import SCENARIO, RunFolder
-from painter.run.report import finish_run
-from painter.run.unfinished import rest_of_run
+from painter.run.figures.unfinished import rest_of_run
+from painter.run.folder.folder import SCENARIO, RunFolder
+from painter.run.page.report import finish_run
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 from painter.timebase import TimeBase
-from perception.depth import CameraIntrinsics
+from perception.depth_camera.depth import CameraIntrinsics
 
 # Deadlines of process data in a rehearsal with simulated drives, s.
 REHEARSAL_TIME = 0.1

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.canopen.bus_file import load_bus
-from painter.canopen.realtime import use_fifo
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.config.units import AXES
+from painter.canopen.process.realtime import use_fifo
 from painter.canopen.sim.rack import Fault
 from painter.canopen.sim.server import RackServer
-from painter.canopen.units import AXES
 from painter.cli.common import JsonOption, RateOption, SetOption, print_result
 from painter.errors import InputError
 from painter.resources import models_path
 from painter.timebase import TimeBase
 
 if TYPE_CHECKING:
-    from painter.cli.hil_bench import HilBench
+    from painter.rehearsal.hil_bench import HilBench
 
 # Below the bus process, which is at 60: real drives wait for no other program.
 _PRIORITY = 50
@@ -136,8 +136,8 @@ def drives(
 
 def _bench(scenario: str, overrides: Sequence[str], camera: str) -> "HilBench":
     # Drake is imported only for drives that move an arm.
-    from painter.cli.hil_bench import HilBench
     from painter.config import load_scenario
+    from painter.rehearsal.hil_bench import HilBench
 
     return HilBench(load_scenario(scenario, overrides), camera=camera)
 

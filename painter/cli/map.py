@@ -19,16 +19,16 @@ from painter.cli.common import (
     progress,
 )
 from painter.errors import InputError
-from perception.bag_io import BAG_SUFFIXES
-from perception.depth import CameraIntrinsics
-from perception.mapping.bag import unpack_bag
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.io.bag_frames import unpack_bag
+from perception.io.bags import BAG_SUFFIXES
+from perception.io.frames import Frame, open_recording, write_poses
 from perception.mapping.config import MapperConfig
-from perception.mapping.frames import Frame, open_recording, write_poses
-from perception.mapping.fusion import write_map, write_mesh, write_voxels
-from perception.mapping.mapper import Mapper
-from perception.mapping.report import session_report
-from perception.mapping.session import join_map, run_session
-from perception.mapping.store import MapStore
+from perception.mapping.fusion.fusion import write_map, write_mesh, write_voxels
+from perception.mapping.sessions.mapper import Mapper
+from perception.mapping.sessions.report import session_report
+from perception.mapping.sessions.session import join_map, run_session
+from perception.mapping.sessions.store import MapStore
 
 MAP_SUFFIX = ".db"
 

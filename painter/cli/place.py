@@ -18,11 +18,11 @@ from painter.cli.common import (
     print_result,
 )
 from painter.config import load_scenario
-from painter.diagrams.reach_map import ReachMapper
 from painter.errors import InputError
+from painter.planning.arm.placement import propose_distance
 from painter.planning.config import ZoneConfig
-from painter.planning.facade import plan_stations
-from painter.planning.placement import propose_distance
+from painter.planning.strokes.facade import plan_stations
+from painter.robot.reach_mapper import ReachMapper
 from painter.scene.config import Scene
 from painter.scene.load import load_scene
 

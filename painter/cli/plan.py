@@ -20,21 +20,22 @@ from painter.cli.common import (
     progress,
 )
 from painter.config import load_scenario
-from painter.diagrams.program_planner import MakeProgramPlanner
 from painter.errors import InputError
-from painter.planning.film_model import margin_cells
-from painter.planning.preview import preview_film
-from painter.planning.program import strokes_from
-from painter.planning.store import program_summary, save_program
+from painter.planning.film.film_model import margin_cells
+from painter.planning.film.preview import preview_film
+from painter.planning.program.program import strokes_from
+from painter.planning.program.store import program_summary, save_program
 from painter.planning.tile import nominal_tile_pose
 from painter.planning.zones import marked_cells
-from painter.run.film_on_tile import film_around
-from painter.run.film_preview import preview_picture
-from painter.run.folder import RunFolder
-from painter.run.pictures import stroke_picture
-from painter.run.style import png
-from perception.store import load_segmentation
-from perception.values import FloatArray, WallSegmentation
+from painter.robot.planners import MakeProgramPlanner
+from painter.run.figures.film_on_tile import film_around
+from painter.run.folder.folder import RunFolder
+from painter.run.pictures.film_preview import preview_picture
+from painter.run.pictures.pictures import stroke_picture
+from painter.run.pictures.style import png
+from perception.ground import FloatArray
+from perception.io.segmentations import load_segmentation
+from perception.values import WallSegmentation
 
 PICTURE_FILE = "program.png"
 PREVIEW_FILE = "film.png"

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from painter.errors import InputError
-from perception.bag_io import BAG_SUFFIXES, read_bag
-from perception.cloud_io import RecordedCloud, read_cloud
-from perception.depth_io import DEPTH_SUFFIX, INTRINSICS_NAME, read_depth_frames
-from perception.values import FloatArray
+from perception.ground import FloatArray
+from perception.io.bags import BAG_SUFFIXES, read_bag
+from perception.io.clouds import RecordedCloud, read_cloud
+from perception.io.depth_images import DEPTH_SUFFIX, INTRINSICS_NAME, read_depth_frames
 
 
 class Unit(enum.StrEnum):

@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from painter.cli.common import JsonOption, print_result
-from painter.run import folder as files
-from painter.run.catalog import FIGURES
-from painter.run.folder import RunFolder
-from painter.run.report import write_report
+from painter.run.folder import folder as files
+from painter.run.folder.folder import RunFolder
+from painter.run.page.catalog import FIGURES
+from painter.run.page.report import write_report
 
 
 def report(

@@ -25,9 +25,9 @@ from painter.cli.recorded_input import (
 )
 from painter.config import load_scenario
 from painter.errors import InputError
-from painter.run.recorded_wall import write_recorded_wall
+from painter.run.page.recorded_wall import write_recorded_wall
 from perception.config import SegmentationConfig
-from perception.recorded import MAX_CELLS, segment_recorded
+from perception.recorded.segment_recorded import MAX_CELLS, segment_recorded
 
 
 def segment(

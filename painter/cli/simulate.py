@@ -13,19 +13,21 @@ from painter.cli.common import (
     JsonOption,
     ScenarioArgument,
     SetOption,
+    mark_corners,
     print_result,
+    print_summary,
     progress,
     versions,
 )
-from painter.cli.earlier_run import EarlierRun
-from painter.cli.run_log import event_watch, print_summary, write_log
 from painter.config import dump_scenario, load_scenario
-from painter.diagrams.simulation import SimulateCycle, Watch
+from painter.cycle.earlier_run import EarlierRun
+from painter.cycle.simulate import SimulateCycle, Watch
+from painter.cycle.write_run import event_watch, write_log
 from painter.errors import FaultError, InputError
-from painter.planning.stroke_lines import nominal_pitch
-from painter.run.folder import SCENE, RunFolder
-from painter.run.replay import add_paint, set_view
-from painter.run.report import finish_run
+from painter.planning.strokes.stroke_lines import nominal_pitch
+from painter.run.folder.folder import SCENE, RunFolder
+from painter.run.page.report import finish_run
+from painter.run.pictures.replay import add_paint, set_view
 from painter.scene.load import load_scene
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 
@@ -165,7 +167,8 @@ def _earlier(
         raise InputError(f"--out {out}: is the run to be gone on with; give another.")
     if resume is not None:
         return EarlierRun.to_resume(resume, words)
-    return EarlierRun.to_touch_up(run, words, clear)
+    corners = None if clear is None else mark_corners("--clear", clear)
+    return EarlierRun.to_touch_up(run, words, corners)
 
 
 def _watch(

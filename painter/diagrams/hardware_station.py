@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.camera.reader import Reading
-from painter.canopen.robot_clock import Bus, RobotClock
+from painter.canopen.process.robot_clock import Bus, RobotClock
 from painter.config import Scenario
-from painter.systems.canopen_arm import CanopenArm
-from painter.systems.realsense_camera import RealsenseCamera
+from painter.systems.hardware.canopen_arm import CanopenArm
+from painter.systems.hardware.realsense_camera import RealsenseCamera
 
 # Time between looks for a new picture, s; a camera takes 30 a second at most.
 CAMERA_PERIOD = 0.02

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import (
 )
 
 from painter.config import Scenario
-from painter.diagrams.arm_model import MakeArmPlant
+from painter.robot.arm_model import MakeArmPlant
 
 NQ = 5
 # The drives differentiate their velocity set-point over this time for feed-forward.

@@ -9,29 +9,29 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.config import Scenario
-from painter.diagrams.program_planner import (
+from painter.diagrams.station import MakeStation
+from painter.planning.program.remainder import Remainder
+from painter.planning.tile import nominal_tile_pose
+from painter.robot.planners import (
     MakeProgramPlanner,
     MakeTransferPlanner,
 )
-from painter.diagrams.station import MakeStation
-from painter.planning.remainder import Remainder
-from painter.planning.tile import nominal_tile_pose
-from painter.systems.camera_pose import CameraPose
-from painter.systems.known_result import KnownResult
-from painter.systems.map_accumulator import MapAccumulator
-from painter.systems.motion_planner import MotionPlanner
-from painter.systems.paint_cycle import (
+from painter.systems.brain.camera_pose import CameraPose
+from painter.systems.brain.known_result import KnownResult
+from painter.systems.brain.map_accumulator import MapAccumulator
+from painter.systems.brain.motion_planner import MotionPlanner
+from painter.systems.brain.paint_cycle import (
     KNOWN_WALL_SEQUENCE,
     SEQUENCE,
     STAGES,
     PaintCycle,
 )
-from painter.systems.paint_film import FilmState
-from painter.systems.path_follower import PathFollower
-from painter.systems.spray_path_planner import SprayPathPlanner
-from painter.systems.wall_finder import WallFinder
-from painter.systems.wall_segmenter import WallSegmenter
-from perception.depth import CameraIntrinsics
+from painter.systems.brain.path_follower import PathFollower
+from painter.systems.brain.spray_path_planner import SprayPathPlanner
+from painter.systems.brain.wall_finder import WallFinder
+from painter.systems.brain.wall_segmenter import WallSegmenter
+from painter.systems.simulated.paint_film import FilmState
+from perception.depth_camera.depth import CameraIntrinsics
 from perception.values import Wall
 
 if TYPE_CHECKING:  # Simulation runs without the robot's packages.

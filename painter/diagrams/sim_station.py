@@ -7,15 +7,15 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from painter.config import Scenario
-from painter.diagrams.arm_model import AddRobot
 from painter.diagrams.joint_loop import AddJointLoop
 from painter.diagrams.surroundings import AddScene, AddSurroundings
 from painter.planning.tile import nominal_tile_pose
+from painter.robot.arm_model import AddRobot
 from painter.scene.load import load_scene
 from painter.scene.sdf import wall_pose
-from painter.systems.joint_encoder import JointEncoder
-from painter.systems.paint_film import FilmState
-from painter.systems.simulated_drives import SimulatedDrives
+from painter.systems.simulated.joint_encoder import JointEncoder
+from painter.systems.simulated.paint_film import FilmState
+from painter.systems.simulated.simulated_drives import SimulatedDrives
 
 
 def MakeSimStation(

@@ -7,7 +7,7 @@ from pydrake.systems.framework import Diagram
 
 from painter.config import Scenario
 from painter.diagrams.sim_station import MakeSimStation
-from painter.systems.paint_film import FilmState
+from painter.systems.simulated.paint_film import FilmState
 
 if TYPE_CHECKING:  # Simulation runs without the robot's packages.
     from painter.diagrams.hardware_station import Body

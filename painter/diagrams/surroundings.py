@@ -27,7 +27,7 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import RgbdSensor
 
 from painter.config import Scenario
-from painter.diagrams.arm_model import (
+from painter.robot.arm_model import (
     FLOOR,
     ROBOT_MODELS,
     X_W_FLOOR,
@@ -36,11 +36,11 @@ from painter.diagrams.arm_model import (
 from painter.scene.config import Scene
 from painter.scene.sdf import scene_sdf
 from painter.scene.surface import height_field
-from painter.systems.clearance_monitor import ClearanceMonitor
-from painter.systems.gun_pose import GunPose
-from painter.systems.paint_film import FilmState, PaintFilm
-from painter.systems.stereo_camera import StereoCamera, render_camera_info
-from perception.depth import CameraIntrinsics
+from painter.systems.simulated.clearance_monitor import ClearanceMonitor
+from painter.systems.simulated.gun_pose import GunPose
+from painter.systems.simulated.paint_film import FilmState, PaintFilm
+from painter.systems.simulated.stereo_camera import StereoCamera, render_camera_info
+from perception.depth_camera.depth import CameraIntrinsics
 
 # Renderers: what light sees, and the same with panes of glass opaque.
 SCENE_RENDERER = "scene"

@@ -6,7 +6,7 @@ Plain mutable dataclasses, because Drake's `yaml_load_typed` fills them field by
 import dataclasses
 import math
 
-from perception.config import check_positive
+from perception.ground import check_positive
 
 MOST_COATS = 4
 

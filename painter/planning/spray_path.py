@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.trajectories import PiecewisePolynomial
 
-from perception.values import FloatArray, FrozenValue
+from perception.ground import FloatArray, FrozenValue
 
 
 @dataclass(frozen=True, eq=False)

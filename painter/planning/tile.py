@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from painter.planning.config import TileConfig
-from perception.values import FloatArray
+from perception.ground import FloatArray
 
 # Columns are T x, y and z in W: a plumb wall across W x, seen from the arm's base.
 _R_WT_NOMINAL = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from painter.planning.config import ZoneConfig
 from painter.planning.tile import cell_centres, grid_points
-from perception.values import BoolArray, FloatArray
+from perception.ground import BoolArray, FloatArray
 
 
 def in_zones(mask: BoolArray, cell: float, zones: Sequence[ZoneConfig]) -> BoolArray:

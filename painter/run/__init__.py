@@ -1,1 +1,4 @@
-"""Run folders: what a run leaves, its figures and its report page."""
+"""Run folders: what a run leaves, its figures, pictures and report page.
+
+Reads what a run left, never a diagram.
+"""

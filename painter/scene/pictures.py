@@ -11,7 +11,7 @@ from painter.scene.config import Scene
 from painter.scene.solids import SurfaceKind
 from painter.scene.surface import cast_rays, is_paintable, surface_at, visible_solids
 from painter.scene.texture import wall_picture
-from perception.values import FloatArray
+from perception.ground import FloatArray
 
 # Colours of the truth picture: white is painted, everything else is kept clean.
 KIND_COLORS = {

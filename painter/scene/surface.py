@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from painter.scene.config import Scene
 from painter.scene.solids import Solid, SurfaceKind, scene_solids
-from perception.values import BoolArray, FloatArray, FrozenValue
+from perception.ground import BoolArray, FloatArray, FrozenValue
 
 KindArray = npt.NDArray[np.uint8]
 

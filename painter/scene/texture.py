@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from painter.scene.config import WallConfig
 from painter.scene.solids import Solid
-from perception.values import FloatArray
+from perception.ground import FloatArray
 
 # Pixels a metre; a D435 at 0.7 m sees about 600 a metre.
 _PIXELS = 300.0

@@ -1,1 +1,5 @@
-"""Drake LeafSystems of the brain and of the simulated body."""
+"""Drake LeafSystems, one a file: wiring around pure functions.
+
+`brain` runs on every robot, `simulated` and `hardware` are the two bodies. Two systems
+never import each other; they share `ports`, `values` and `stage`.
+"""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from painter.planning.spray_path import Motion
-from perception.values import FloatArray, FrozenValue
+from perception.ground import FloatArray, FrozenValue
 
 UP_W: FloatArray = np.array([0.0, 0.0, 1.0])
 """Against gravity: the robot stands on a level floor, and W's z is up."""

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 
-from perception.config import check_positive
+from perception.ground import check_positive
 
 
 @dataclasses.dataclass(kw_only=True)

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from painter.canopen.feedback import Phase as BusPhase
+from painter.canopen.master.feedback import Phase as BusPhase
 from painter.canopen.sim.rack import Fault
-from painter.diagrams.arm_model import GetArmKinematics, MakeArmPlant
-from painter.diagrams.deployment import DeployCycle
-from painter.diagrams.true_wall import true_segmentation
-from painter.planning.program import strokes_from
-from painter.planning.remainder import Remainder
+from painter.cycle.deploy import DeployCycle
+from painter.cycle.true_wall import true_segmentation
+from painter.planning.program.program import strokes_from
+from painter.planning.program.remainder import Remainder
 from painter.planning.spray_path import Stroke
+from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
 from painter.systems.values import Phase
 from tests.hil import Loop, small_scenario
 

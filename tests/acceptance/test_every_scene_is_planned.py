@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from painter.config import load_scenario
-from painter.diagrams.program_planner import MakeProgramPlanner, MakeTransferPlanner
-from painter.diagrams.true_wall import true_segmentation
+from painter.cycle.true_wall import true_segmentation
 from painter.planning.tile import nominal_tile_pose
+from painter.robot.planners import MakeProgramPlanner, MakeTransferPlanner
 
 NAMED = [(name, 1) for name in ("blank", "cubes", "obstacles", "room", "terrace")]
 RANDOM = [("random", seed) for seed in range(1, 21)]

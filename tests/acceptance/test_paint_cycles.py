@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from painter.cli.main import run
-from painter.run.folder import FILES, INCOMPLETE
+from painter.run.folder.folder import FILES, INCOMPLETE
 
 # The seed 1 of DESIGN's "random" with the five named scenes.
 SCENES = ["cubes", "obstacles", "terrace", "room", "blank", "random"]

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from painter.cli.main import run
-from painter.run.arrays import load_film
-from painter.run.folder import FILM, REPORT
+from painter.run.folder.arrays import load_film
+from painter.run.folder.folder import FILM, REPORT
 
 # Five cycles of a minute or two each, on a machine that may have other work.
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]

@@ -12,7 +12,7 @@ from painter.camera.frames import CameraError, CameraFrame
 from painter.camera.reader import CameraReader, CameraState, camera_opener
 from painter.errors import InputError
 from perception.config import StereoConfig
-from perception.depth import CameraIntrinsics
+from perception.depth_camera.depth import CameraIntrinsics
 
 CONFIG = CameraDriverConfig(silence=0.3, retries=2, retry_period=0.05)
 PATIENCE = 20.0

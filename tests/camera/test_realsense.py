@@ -18,10 +18,10 @@ from painter.camera.realsense import (  # noqa: E402
 )
 from painter.camera.software import SoftwareCamera  # noqa: E402
 from perception.config import StereoConfig  # noqa: E402
-from perception.depth import CameraIntrinsics  # noqa: E402
+from perception.depth_camera.depth import CameraIntrinsics  # noqa: E402
 
 CAMERA = CameraIntrinsics.from_stereo(StereoConfig())
-BAG = Path(__file__).parents[1] / "perception" / "data" / "software_device.bag"
+BAG = Path(__file__).parents[1] / "perception" / "io" / "data" / "software_device.bag"
 
 
 class Pictures:

@@ -10,14 +10,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from painter.canopen.arm_bus import ArmBus
-from painter.canopen.bus_config import BusConfig
-from painter.canopen.bus_file import load_bus
-from painter.canopen.feedback import Phase
-from painter.canopen.links import CanLink
-from painter.canopen.setpoints import Setpoint
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.master.arm_bus import ArmBus
+from painter.canopen.master.feedback import Phase
+from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.sim.rack import Rack
 from painter.canopen.sim.wire import Wire
+from painter.canopen.wire.links import CanLink
 from painter.resources import models_path
 
 CHANNEL = os.environ.get("PAINTER_CAN")

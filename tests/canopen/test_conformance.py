@@ -6,17 +6,23 @@ from pathlib import Path
 import pytest
 
 from painter.canopen import sim
-from painter.canopen.cia402 import STATUS_CODES, TRANSITIONS, State, Status, state_of
-from painter.canopen.codes import SDO_ABORTS
-from painter.canopen.device import ObjectInfo
-from painter.canopen.frames import Frame
-from painter.canopen.od_types import DataType
+from painter.canopen.config.device import ObjectInfo
+from painter.canopen.config.standard_objects import standard_drive
+from painter.canopen.config.units import AxisUnits
+from painter.canopen.protocol.cia402 import (
+    STATUS_CODES,
+    TRANSITIONS,
+    State,
+    Status,
+    state_of,
+)
+from painter.canopen.protocol.codes import SDO_ABORTS
+from painter.canopen.protocol.frames import Frame
+from painter.canopen.protocol.od_types import DataType
 from painter.canopen.sim.drive import SimDrive
 from painter.canopen.sim.node import Nmt
 from painter.canopen.sim.store import LOAD, SAVE
 from painter.canopen.sim.wire import Wire
-from painter.canopen.standard_objects import standard_drive
-from painter.canopen.units import AxisUnits
 
 UNITS = AxisUnits(counts_per_turn=4096, gear=100)
 COUNTS_S = 20_000  # Speed of the moving axis, counts/s.

@@ -5,8 +5,8 @@ import random
 import numpy as np
 import pytest
 
-from painter.canopen.feedback import Phase
-from painter.canopen.frames import Frame
+from painter.canopen.master.feedback import Phase
+from painter.canopen.protocol.frames import Frame
 from painter.canopen.sim.rack import Rack
 
 # Frames a step that leave the bus's own cycle its time: the wire's worst case.

@@ -8,10 +8,10 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from painter.cli.main import run
 from painter.config import load_scenario
-from painter.diagrams.arm_model import GetArmKinematics, MakeArmPlant
+from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
 from perception.config import StereoConfig
-from perception.depth import CameraIntrinsics
-from perception.mapping.frames import Frame, write_recording
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.io.frames import Frame, write_recording
 
 CAMERA = CameraIntrinsics.from_stereo(StereoConfig(width=424, height=240))
 TURN_DEG = [0.5, -0.4, 0.6]

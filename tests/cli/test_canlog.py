@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from painter.canopen.arm_bus import ArmBus
-from painter.canopen.bus_file import load_bus
-from painter.canopen.candump import LogRecord, format_record
-from painter.canopen.feedback import Phase
-from painter.canopen.setpoints import Setpoint
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.master.arm_bus import ArmBus
+from painter.canopen.master.feedback import Phase
+from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.sim.rack import Fault, Rack
+from painter.canopen.wire.candump import LogRecord, format_record
 from painter.cli.main import run
 from painter.resources import models_path
 

@@ -4,8 +4,8 @@ import pytest
 
 from painter.cli.deploy import slowed
 from painter.cli.main import run
-from painter.cli.step_by_step import StepByStep
 from painter.config import load_scenario
+from painter.cycle.step_by_step import StepByStep
 from painter.systems.values import Phase
 
 

@@ -16,9 +16,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from painter.cli.main import run
 from perception.config import StereoConfig
-from perception.depth import CameraIntrinsics
-from perception.mapping.frames import read_poses, write_recording
-from perception.mapping.sequences import SequenceConfig, WallKind, render_sequence
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.io.frames import read_poses, write_recording
+from perception.synthetic.sequences import SequenceConfig, WallKind, render_sequence
 
 STEREO = StereoConfig(width=424, height=240, fattening=5)
 

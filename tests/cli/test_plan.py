@@ -9,9 +9,9 @@ from pydrake.math import RigidTransform
 
 from painter.cli.main import run
 from painter.planning.config import TileConfig
-from painter.planning.store import load_program
+from painter.planning.program.store import load_program
 from painter.planning.tile import nominal_tile_pose
-from perception.store import save_segmentation
+from perception.io.segmentations import save_segmentation
 from perception.values import WallSegmentation
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from painter.cli.main import run
 from painter.config import Scenario, dump_scenario
-from painter.run.folder import RunFolder
+from painter.run.folder.folder import RunFolder
 
 
 @pytest.fixture

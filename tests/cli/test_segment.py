@@ -8,8 +8,8 @@ from PIL import Image
 from pydrake.math import RigidTransform, RotationMatrix
 
 from painter.cli.main import run
-from perception.store import load_segmentation
-from perception.synthetic import Patch, synthetic_wall
+from perception.io.segmentations import load_segmentation
+from perception.synthetic.patch_wall import Patch, synthetic_wall
 
 # As a camera sees it, 0.8 m ahead: T x = C x, T y = -C y, T z = -C z.
 X_CT = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [-1.0, 1.0, 0.8])

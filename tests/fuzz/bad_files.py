@@ -21,10 +21,10 @@ from PIL import Image
 
 from painter.cli.recorded_input import Unit, read_input
 from painter.errors import PainterError
-from painter.run.recorded_wall import segmentation_figures
+from painter.run.page.recorded_wall import segmentation_figures
 from perception.config import SegmentationConfig
 from perception.errors import PerceptionError
-from perception.recorded import segment_recorded
+from perception.recorded.segment_recorded import segment_recorded
 
 TIMEOUT = 30  # s
 COUNTS = (

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from perception.cloud_io import CLOUD_SUFFIXES, read_cloud
 from perception.config import SegmentationConfig
 from perception.errors import PerceptionError
-from perception.recorded import segment_recorded
+from perception.io.clouds import CLOUD_SUFFIXES, read_cloud
+from perception.recorded.segment_recorded import segment_recorded
 
 WORKER = Path(__file__).with_name("bad_files.py")
 MOST_MEMORY = 4 * 2**30

@@ -9,14 +9,14 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
-from painter.diagrams.arm_model import (
+from painter.resources import models_path
+from painter.robot.arm_model import (
     JOINT_NAMES,
     AddRobot,
     GetArmKinematics,
     GetArmLimits,
     MakeArmPlant,
 )
-from painter.resources import models_path
 from painter_models.generate.__main__ import generated_files
 
 CELL = "package://painter_models/painter_cell.dmd.yaml"

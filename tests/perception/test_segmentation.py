@@ -6,10 +6,15 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.config import MapConfig, SegmentationConfig
 from perception.errors import NoWallError
+from perception.fine_steps.unseen import Reason
+from perception.mapping.fusion.voxel_map import VoxelMap
 from perception.segmentation import segment_wall
-from perception.synthetic import EXAMPLE_PATCHES, Patch, synthetic_truth, synthetic_wall
-from perception.unseen import Reason
-from perception.voxel_map import VoxelMap
+from perception.synthetic.patch_wall import (
+    EXAMPLE_PATCHES,
+    Patch,
+    synthetic_truth,
+    synthetic_wall,
+)
 
 SIZE = {"width": 2.0, "height": 2.0}
 GLASS = float("nan")

@@ -7,20 +7,20 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.planning import CollisionChecker
 
-from painter.diagrams.arm_model import (
+from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.clearance.obstacles import ClearSpace, ObstacleBox, wall_box
+from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
+from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.joint_motion import planning_limits
+from painter.planning.motion.transitions import Linker
+from painter.planning.program.program import ProgramPlanner
+from painter.planning.tile import nominal_tile_pose
+from painter.robot.arm_model import (
     GetArmKinematics,
     GetArmLimits,
     MakeArmPlant,
     MakeCollisionChecker,
 )
-from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
-from painter.planning.gun_path import SquareGun
-from painter.planning.joint_motion import planning_limits
-from painter.planning.kinematics import ArmKinematics, ArmLimits
-from painter.planning.linker import Linker
-from painter.planning.obstacles import ClearSpace, ObstacleBox, wall_box
-from painter.planning.program import ProgramPlanner
-from painter.planning.tile import nominal_tile_pose
 from perception.values import WallSegmentation
 
 DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"

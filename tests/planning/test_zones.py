@@ -6,8 +6,8 @@ import pytest
 from painter.config import load_scenario
 from painter.errors import InputError
 from painter.planning.config import RasterConfig, TipConfig, ZoneConfig
-from painter.planning.raster import plan_strokes
-from painter.planning.tips import airless_tip
+from painter.planning.film.tips import airless_tip
+from painter.planning.strokes.raster import plan_strokes
 from painter.planning.zones import in_zones
 
 MASK = np.ones((200, 200), dtype=bool)

@@ -8,8 +8,8 @@ from painter.config import Scenario, dump_scenario
 from painter.planning.config import TileConfig
 from painter.planning.spray_path import Motion, PaintProgram, Stroke
 from painter.planning.tile import nominal_tile_pose
-from painter.run.folder import RunFolder
-from painter.run.values import Executed, Film, Truth
+from painter.run.folder.folder import RunFolder
+from painter.run.folder.values import Executed, Film, Truth
 from perception.values import SurfaceMap, WallSegmentation
 
 CELL = 0.01

@@ -17,13 +17,13 @@ import time
 import numpy as np
 import pytest
 
-from painter.canopen.bus_file import load_bus
-from painter.canopen.bus_process import BusProcess
-from painter.canopen.candump import read_log
-from painter.canopen.feedback import Phase
-from painter.canopen.frames import ERROR_BUS_OFF, SYNC_ID, Frame
-from painter.canopen.links import CanLink, LinkError
-from painter.canopen.setpoints import Setpoint
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.master.feedback import Phase
+from painter.canopen.master.setpoints import Setpoint
+from painter.canopen.process.bus_process import BusProcess
+from painter.canopen.protocol.frames import ERROR_BUS_OFF, SYNC_ID, Frame
+from painter.canopen.wire.candump import read_log
+from painter.canopen.wire.links import CanLink, LinkError
 from painter.resources import models_path
 
 CHANNEL = os.environ.get("PAINTER_CAN")

@@ -3,7 +3,9 @@
 Source: CiA 402-2 v4.0.0; clauses and objects are named where they count.
 """
 
-from painter.canopen.cia402 import (
+from painter.canopen.config.device import DeviceDescription, Mode, modes_of
+from painter.canopen.config.units import AccelerationUnit, AxisUnits, VelocityUnit
+from painter.canopen.protocol.cia402 import (
     CONTROL_HALT,
     CONTROL_MODE_4,
     HOLDING_QUICK_STOP,
@@ -15,14 +17,12 @@ from painter.canopen.cia402 import (
     Status,
     command_of,
 )
-from painter.canopen.device import DeviceDescription, Mode, modes_of
-from painter.canopen.od_types import Value
+from painter.canopen.protocol.od_types import Value
 from painter.canopen.sim.motion import Demand, HomingRun, SyncedTarget
 from painter.canopen.sim.motor import Motor
 from painter.canopen.sim.node import HEARTBEAT_LOST, SimNode
 from painter.canopen.sim.store import SdoAbortError
 from painter.canopen.sim.wire import Wire
-from painter.canopen.units import AccelerationUnit, AxisUnits, VelocityUnit
 
 FOLLOWING_ERROR = 0x8611
 _POWERED = (State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION)

@@ -4,9 +4,9 @@ Source: CiA 401-1 v3.1.0, objects 6000h, 6200h, 6206h, 6207h, 6401h, 6411h, 6443
 6444h.
 """
 
+from painter.canopen.config.standard_objects import standard_io
 from painter.canopen.sim.node import SimNode
 from painter.canopen.sim.wire import Wire
-from painter.canopen.standard_objects import standard_io
 
 
 class SimIo(SimNode):

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from painter.canopen.units import FloatArray
+from perception.ground import FloatArray
 
 
 class Load(Protocol):

@@ -8,14 +8,14 @@ from collections import deque
 
 import numpy as np
 
-from painter.canopen.arm_bus import ArmBus
-from painter.canopen.bus_process import Report
-from painter.canopen.feedback import Phase
-from painter.canopen.sample_ring import Samples
-from painter.canopen.setpoints import Setpoint
+from painter.canopen.master.arm_bus import ArmBus
+from painter.canopen.master.feedback import Phase
+from painter.canopen.master.setpoints import Setpoint
+from painter.canopen.process.bus_process import Report
+from painter.canopen.process.sample_ring import Samples
 from painter.canopen.sim.rack import STEP, Rack
-from painter.canopen.units import FloatArray
 from painter.errors import BusError
+from perception.ground import FloatArray
 
 _KEPT = 2048
 _SWITCH_OFF_TIME = 5.0

@@ -6,8 +6,8 @@ Source: CiA 301 v4.2.0; clauses are named where they count.
 import enum
 from collections.abc import Callable
 
-from painter.canopen.device import DeviceDescription
-from painter.canopen.frames import (
+from painter.canopen.config.device import DeviceDescription
+from painter.canopen.protocol.frames import (
     HEARTBEAT_BASE,
     NMT_ID,
     SDO_TO_CLIENT,
@@ -15,7 +15,7 @@ from painter.canopen.frames import (
     SYNC_ID,
     Frame,
 )
-from painter.canopen.od_types import Value
+from painter.canopen.protocol.od_types import Value
 from painter.canopen.sim.pdo import Pdo, PdoEngine
 from painter.canopen.sim.sdo_server import SdoServer
 from painter.canopen.sim.store import ObjectStore

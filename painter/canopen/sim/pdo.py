@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
-from painter.canopen.od_types import Value, pack, size_of, unpack
+from painter.canopen.protocol.od_types import Value, pack, size_of, unpack
 from painter.canopen.sim.store import ObjectStore, SdoAbortError
 
 _INVALID = 1 << 31

@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from painter.canopen.bus_config import BusConfig
-from painter.canopen.frames import ERROR_BUS_OFF, Frame
-from painter.canopen.links import LinkError
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.config.units import AXES
+from painter.canopen.protocol.frames import ERROR_BUS_OFF, Frame
 from painter.canopen.sim.drive import SimDrive
 from painter.canopen.sim.io_node import SimIo
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.motor import LoadedMotor
 from painter.canopen.sim.node import Nmt, SimNode
 from painter.canopen.sim.wire import Wire
-from painter.canopen.units import AXES
+from painter.canopen.wire.links import LinkError
 
 STEP = 0.001
 

@@ -8,12 +8,18 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
-from painter.canopen.bus_config import BusConfig
-from painter.canopen.frames import SYNC_ID, Frame
-from painter.canopen.links import Link, LinkError, open_link, pack_frame, unpack_frame
-from painter.canopen.realtime import settle_memory
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.process.realtime import settle_memory
+from painter.canopen.protocol.frames import SYNC_ID, Frame
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.rack import STEP, Rack
+from painter.canopen.wire.links import (
+    Link,
+    LinkError,
+    open_link,
+    pack_frame,
+    unpack_frame,
+)
 from painter.timebase import TimeBase
 
 _MOST_BEHIND = 0.1

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from painter.canopen.device import DeviceDescription, ObjectInfo
-from painter.canopen.od_types import Value, pack, size_of, unpack
+from painter.canopen.config.device import DeviceDescription, ObjectInfo
+from painter.canopen.protocol.od_types import Value, pack, size_of, unpack
 
 # Signatures of 1010h and 1011h. Source: CiA 301 v4.2.0, 7.5.2.13 and 7.5.2.14.
 SAVE = int.from_bytes(b"save", "little")

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from painter.canopen.frames import Frame, frame_time
+from painter.canopen.protocol.frames import Frame, frame_time
 
 Receiver = Callable[[Frame, float], None]
 

@@ -3,8 +3,8 @@ import itertools
 import pytest
 
 from perception.config import StereoConfig
-from perception.depth import CameraIntrinsics
-from perception.mapping.sequences import SequenceConfig, WallKind, render_sequence
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.synthetic.sequences import SequenceConfig, WallKind, render_sequence
 
 # Half the pixels each way: the same field of view in a quarter of the time.
 STEREO = StereoConfig(width=424, height=240, fattening=5)

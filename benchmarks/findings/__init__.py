@@ -1,0 +1,1 @@
+"""What is found: masks, maps, film, bounds. Hours, not minutes."""

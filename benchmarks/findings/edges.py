@@ -1,0 +1,180 @@
+"""What an edge allows: coverage against soiled keep-out, by theory and as planned.
+
+Run `python -m benchmarks.findings.edges --out DIR [--scene terrace]`; DIR gets
+`edges.png` and the table is printed.
+
+By theory: one stroke of a fan with half width a runs beside a straight edge at an
+offset that is free. Wall counts as covered from 80 % of the nominal film, what lies
+beyond the edge as soiled from 10 %; a recess catches thinner film farther in. Along
+edges across the strokes the fan's thickness does the same. Everything else is taken
+as perfect: bare and soiled strips are all there is, no corners, no errors of mask,
+base or arm.
+
+As planned: strokes from `plan_strokes` on the exact mask, by `FilmModel`, with soiling
+weighed more and more.
+"""
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from unittest import mock
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from painter.planning.config import RasterConfig, TipConfig
+from painter.planning.film import film_cost
+from painter.planning.film.deposition import half_axes
+from painter.planning.film.film_model import FilmModel, Site
+from painter.planning.strokes.raster import plan_strokes, raster_film
+from painter.scene.load import load_scene
+from painter.scene.surface import height_field, is_paintable
+from perception.ground import BoolArray, FloatArray
+
+CELL = 0.01
+TIP = TipConfig()
+COVERED, SOILED = 0.8, 0.1
+STANDOFFS = (0.30, 0.20, 0.10, 0.08, 0.06)  # m, of the strokes beside edges.
+FLOWS = (1.0, 1.25, 1.5)  # Peak of such a stroke's film, as share of nominal.
+# Of soiled cells: half of the planner's own weight, that, and twice as much.
+WEIGHTS = tuple(share * film_cost._OPENINGS.soiled for share in (0.5, 1.0, 2.0))
+ASKED = {"terrace": (0.96, 0.03), "room": (0.96, 0.03)}  # Coverage, keepout_paint.
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Lengths of a scene's edges and its areas; m and m².
+
+    Attributes:
+        along: Edges of what stays clean that run along the strokes.
+        across: Those that run across them.
+        wall: To be painted.
+        clean: To stay clean.
+        recess: How far what stays clean lies back.
+    """
+
+    along: float
+    across: float
+    wall: float
+    clean: float
+    recess: float
+
+
+def main() -> None:
+    """Prints the table and draws the picture."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/edges"), help="folder of the picture"
+    )
+    parser.add_argument("--scene", default="terrace", help="a named scene")
+    arguments = parser.parse_args()
+    field = height_field(load_scene(arguments.scene, 1), cell=CELL)
+    mask, height = is_paintable(field.kind), np.asarray(field.height)
+    edges = edges_of(mask, height)
+    print(f"{arguments.scene}: {edges}")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    figure, axes = plt.subplots(figsize=(7.0, 5.0), layout="constrained")
+    print("\nby theory: least keep-out soiled, %, at a coverage of")
+    shares = (0.94, 0.95, 0.96, 0.97, 0.98)
+    print("stand-off  flow " + "".join(f"{share:8.2f}" for share in shares))
+    for standoff in STANDOFFS:
+        for flow in FLOWS:
+            coverage, soiled = theory(edges, standoff, flow)
+            lowest = [soiled[coverage >= share].min() for share in shares]
+            row = "".join(f"{100 * value:8.1f}" for value in lowest)
+            print(f"{standoff:9.2f} {flow:5.2f} {row}")
+        axes.plot(coverage, 100 * soiled, label=f"theory, {100 * standoff:.0f} cm")
+    print("\nas planned, exact mask")
+    print("stand-off  weight coverage  soiled overspray      CV")
+    for standoff in STANDOFFS[2:]:
+        rows = [planned(mask, height, standoff, weight) for weight in WEIGHTS]
+        for weight, row_of in zip(WEIGHTS, rows, strict=True):
+            covered, dirty, spilt, cv = row_of
+            print(
+                f"{standoff:9.2f} {weight:7.1f} {covered:8.3f} {100 * dirty:6.1f} % "
+                f"{100 * spilt:7.1f} % {100 * cv:5.1f} %"
+            )
+        points = np.array(rows)
+        name = f"planned, {100 * standoff:.0f} cm"
+        axes.plot(points[:, 0], 100 * points[:, 1], "o--", label=name)
+    if arguments.scene in ASKED:
+        least, most = ASKED[arguments.scene]
+        axes.plot(least, 100 * most, "k*", markersize=14, label="asked")
+    axes.set(
+        xlim=(0.92, 1.0), ylim=(0.0, 16.0), xlabel="coverage", ylabel="keep-out, %"
+    )
+    axes.legend(fontsize="small")
+    figure.savefig(arguments.out / f"edges_{arguments.scene}.png", dpi=110)
+
+
+def edges_of(mask: BoolArray, height: FloatArray) -> Edges:
+    """Measures a scene's edges inside the tile."""
+    along = np.abs(np.diff(mask.astype(int), axis=1)).sum() * CELL
+    across = np.abs(np.diff(mask.astype(int), axis=0)).sum() * CELL
+    clean = height[~mask & np.isfinite(height)]
+    return Edges(
+        along=float(along),
+        across=float(across),
+        wall=float(mask.sum()) * CELL**2,
+        clean=float((~mask).sum()) * CELL**2,
+        recess=float(max(-np.median(clean), 0.0)) if clean.size else 0.0,
+    )
+
+
+def theory(edges: Edges, standoff: float, flow: float) -> tuple[FloatArray, FloatArray]:
+    """Returns coverage and soiled share (n,) over the offset of strokes from edges.
+
+    Bare and soiled strips along both kinds of edges are shared so that an edge of
+    either kind gains as much coverage for a soiled centimetre.
+
+    Args:
+        edges: Of the scene.
+        standoff: Of the strokes beside edges, m.
+        flow: Peak of their film, as share of nominal.
+    """
+    a, b = half_axes(TIP, standoff)
+    spread = 1.0 + edges.recess / standoff  # Of what lands in a recess.
+
+    def reach(film: float) -> float:
+        """Share of the half width within which a stroke leaves at least `film`."""
+        core = 1.0 - min(film / flow, 1.0) ** (1.0 / TIP.gamma)
+        return float(np.sqrt(max(core, 0.0)))
+
+    covers, soils = a * reach(COVERED), a * reach(SOILED * spread)
+    # A stroke's end: of the flow a share 1/2 + 3/4 s - 1/4 s³ has passed (beta2 = 2).
+    s = np.linspace(-1.0, 1.0, 4001)
+    passed = 0.5 + 0.75 * s - 0.25 * s**3
+    end_covers = b * float(np.interp(COVERED, passed, s))
+    end_soils = -b * float(np.interp(min(SOILED * spread, 0.5), passed, s))
+
+    shift = np.linspace(0.0, 0.08, 641)  # m, strokes towards what stays clean.
+    bare = np.maximum(soils - covers - shift, 0.0)
+    dirty = np.maximum(shift * spread, 0.0)
+    end_bare = np.maximum(end_covers + end_soils - shift, 0.0)
+    lost = edges.along * bare + edges.across * end_bare
+    soiled = (edges.along + edges.across) * dirty
+    return 1.0 - lost / edges.wall, soiled / edges.clean
+
+
+def planned(
+    mask: BoolArray, height: FloatArray, standoff: float, weight: float
+) -> tuple[float, float, float, float]:
+    """Returns coverage, soiled share, overspray and CV of the planner's strokes."""
+    raster = RasterConfig(cut_in_standoff=standoff)
+    weights = film_cost._OPENINGS._replace(soiled=weight)
+    with mock.patch.object(film_cost, "_OPENINGS", weights):
+        strokes = plan_strokes(mask, CELL, tip=TIP, raster=raster, height=height)
+    nominal = raster_film(mask.shape[1] * CELL, tip=TIP, raster=raster)
+    site = Site.of_tile(mask, CELL, height)
+    film = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal).film(strokes)
+    on, off = film[site.wanted], film[site.clean]
+    return (
+        float(np.mean(on >= COVERED)),
+        float(np.mean(off >= SOILED)),
+        float(1.0 - on.sum() / film.sum()),
+        float(on.std() / on.mean()),
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,4 @@
+"""Logs of the bus in words and figures.
+
+Reads what was recorded; never sends.
+"""

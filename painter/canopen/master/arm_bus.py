@@ -1,0 +1,395 @@
+"""The master: one object that owns the bus; no thread, no clock of its own.
+
+`cycle` is called once a cycle with its due time, `poll` as often as wished in between;
+cyclic_loop.py does that in real time, tests in simulated time. Whatever goes wrong
+stops all axes, closes the gun and latches the reason until `acknowledge`.
+"""
+
+import logging
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.config.units import AXES, axes_from_joints, joints_from_axes
+from painter.canopen.master.drive_client import DriveClient
+from painter.canopen.master.feedback import Feedback, Phase, Statistics
+from painter.canopen.master.follower import SetpointFollower
+from painter.canopen.master.io_client import IoClient
+from painter.canopen.master.node_client import OPERATIONAL, NodeClient, Script, together
+from painter.canopen.master.setpoints import Setpoint
+from painter.canopen.master.watch import LoadMeter, first_complaint
+from painter.canopen.protocol.cia402 import Command
+from painter.canopen.protocol.frames import (
+    ERROR_BUS_OFF,
+    HEARTBEAT_BASE,
+    SYNC_ID,
+    Frame,
+    frame_time,
+)
+from painter.canopen.wire.links import Link, LinkError
+from painter.errors import BusError
+from perception.ground import FloatArray
+
+_LOGGER = logging.getLogger(__name__)
+_REOPEN_EVERY = 0.25
+
+
+class ArmBus:
+    """Brings nodes up, streams setpoints, watches, stops."""
+
+    def __init__(self, bus: BusConfig, link: Link) -> None:
+        """Creates the master; nothing is sent yet.
+
+        Args:
+            bus: What is on the bus.
+            link: The way to it.
+
+        Raises:
+            InputError: A drive's EDS does not allow its configuration.
+        """
+        self._bus = bus
+        self._link = link
+        limits = bus.drive_limits()
+        self.drives = [
+            DriveClient(axis, bus, limit, self._send)
+            for axis, limit in zip(AXES, limits, strict=True)
+        ]
+        self.io = IoClient(bus, self._send)
+        self.nodes: list[NodeClient] = [*self.drives, self.io]
+        self._by_id = {node.node_id: node for node in self.nodes}
+        self._follower = SetpointFollower(
+            bus.joint_limits(),
+            cycle=bus.cycle,
+            timeout=bus.timeouts.setpoint,
+            sync_time=frame_time(0, bus.bitrate),
+        )
+        self.phase = Phase.DOWN
+        self.reason = ""
+        self._stopped_at = 0.0
+        # Called right before each SYNC, to take its time.
+        self.before_sync: Callable[[], None] | None = None
+        # Called with what all drives measured at a SYNC: its due time, q, v, trigger.
+        self.measured: Callable[[float, FloatArray, FloatArray, float], None] = (
+            lambda *sample: None
+        )
+        self._script: Script | None = None
+        self._is_cyclic = False  # SYNC runs and process data is watched.
+        self._is_lost = False
+        self._reopen_at = 0.0
+        self._next_heartbeat = 0.0
+        self._last_cycle: float | None = None
+        self._now = 0.0
+        counted = ("cycles", "overruns", "missing", "foreign", "malformed")
+        self._counts = dict.fromkeys(counted, 0)
+        self._meter = LoadMeter(bus.bitrate)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the way to the bus is lost."""
+        return self._is_lost
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no script (bring-up, homing, switching off) runs."""
+        return self._script is None
+
+    # Commands.
+
+    def start(self) -> None:
+        """Begins bring-up: configure, verify, operational, enable, home."""
+        self._follower.release()
+        self._begin(self._start_up(self.nodes))
+
+    def acknowledge(self) -> None:
+        """Begins again after a stop; nodes that rebooted are configured anew.
+
+        Raises:
+            BusError: Nothing is latched, or the cause is still there; names it.
+        """
+        if self.phase != Phase.STOPPED:
+            raise BusError(f"nothing to acknowledge: the bus is {self.phase}.")
+        if self._is_lost:
+            raise BusError(f"cannot acknowledge, the bus is still lost: {self.reason}")
+        if self.io.inputs is not None and not self.io.is_chain_closed:
+            raise BusError("cannot acknowledge: the e-stop chain is open.")
+        self.reason, self._stopped_at = "", 0.0
+        self._follower.release()
+        self._begin(
+            self._start_up([n for n in self.nodes if not n.is_sound(self._now)])
+        )
+
+    def push(self, points: Sequence[Setpoint]) -> None:
+        """Adds setpoints; while no motion is allowed they are dropped.
+
+        Raises:
+            ValueError: They are not in order of time, or not finite.
+        """
+        if self.phase != Phase.ENABLED:
+            return
+        self._follower.push(points)
+
+    def stop(self, reason: str, *, quick: bool = False) -> None:
+        """Stops all axes, closes the gun and latches the reason.
+
+        Args:
+            reason: Said in the feedback until it is acknowledged.
+            quick: By the drives' quick stop, else by a ramp that stays enabled.
+        """
+        was, self.io.trigger = self.phase, 0.0
+        if not self.reason:
+            self.reason, self._stopped_at = reason, self._now
+            _LOGGER.warning("stopped: %s", reason)
+        self.phase = Phase.STOPPED
+        if self._script is not None:
+            self._script.close()
+            self._script = None
+        if quick or was not in (Phase.ENABLED, Phase.STOPPED):
+            self._follower.release()
+            for drive in self.drives:
+                drive.controlword = Command.QUICK_STOP
+                drive.target = drive.position
+        elif was == Phase.ENABLED:
+            self._follower.brake(self._now)
+        self._send_outputs()
+
+    def shut_down(self) -> None:
+        """Begins to switch off: ramp, brakes, power."""
+        if self.phase in (Phase.ENABLED, Phase.STARTING):
+            self.stop("switched off.")
+        self._begin(self._switch_off(self._now + self._follower.braking_time))
+
+    # Time.
+
+    def cycle(self, now: float, *, overruns: int = 0) -> None:
+        """One cycle: SYNC, targets, gun; what came is read first.
+
+        Args:
+            now: When it was due, s.
+            overruns: Cycles that were skipped before it.
+        """
+        self.poll(now)
+        self._counts["overruns"] += overruns
+        self._follower.fall_behind(overruns)
+        if self._is_cyclic and not self._is_lost:
+            self._note_measured()
+            self._expect_answers()
+            self._counts["cycles"] += 1
+            if self.before_sync is not None:
+                self.before_sync()
+            self._send(Frame(SYNC_ID))
+            self._follow(now)
+            self._send_outputs()
+        self._last_cycle = now
+
+    def poll(self, now: float, timeout: float = 0.0) -> None:
+        """Reads frames, watches, and goes on with what runs.
+
+        Args:
+            now: Time, s.
+            timeout: How long to wait for a frame, s.
+        """
+        self._now = now
+        frames: list[Frame] = []
+        if self._is_lost:
+            self._reopen(now)
+        else:
+            try:
+                frames = self._link.receive(timeout)
+            except LinkError as error:
+                self._lose(f"bus lost: {error}")
+        for frame in frames:
+            self._take(frame, now)
+        if self._is_lost:
+            return
+        if self.phase != Phase.DOWN and now >= self._next_heartbeat:
+            self._next_heartbeat = now + self._bus.timeouts.heartbeat / 3.0
+            state = bytes([OPERATIONAL])
+            self._send(Frame(HEARTBEAT_BASE + self._bus.master_id, state))
+        for node in self.nodes:
+            node.poll(now)
+        self._watch(now)
+        self._advance_script()
+
+    def feedback(self) -> Feedback:
+        """Returns the state of the arm."""
+        q, v = self._actual()
+        return Feedback(
+            time=self._now,
+            phase=self.phase,
+            reason=self.reason,
+            stopped_at=self._stopped_at,
+            q=q,
+            v=v,
+            q_commanded=self._follower.q.copy(),
+            trigger=self.io.trigger,
+            axes=tuple(drive.status() for drive in self.drives),
+            is_chain_closed=self.io.is_chain_closed,
+            pressure=self.io.pressure,
+            buffered=len(self._follower),
+            statistics=Statistics(
+                **self._counts,
+                retries=sum(node.sdo.retry_count for node in self.nodes),
+                load=self._meter.load(self._now),
+            ),
+        )
+
+    # Scripts.
+
+    def _begin(self, script: Script) -> None:
+        if self._script is not None:
+            self._script.close()
+        self.phase = Phase.STARTING
+        self._script = script
+
+    def _advance_script(self) -> None:
+        if self._script is None:
+            return
+        try:
+            next(self._script)
+        except StopIteration:
+            self._script = None
+        except BusError as error:
+            self._script = None
+            self.stop(str(error), quick=True)
+
+    def _start_up(self, nodes: Sequence[NodeClient]) -> Script:
+        if nodes:
+            self._is_cyclic = False  # No SYNC while PDOs are mapped.
+            yield from together([node.bring_up() for node in nodes])
+        for node in self.nodes:
+            node.got_tpdo, node.missed, node.alarm = False, 0, None
+            node.start()
+        for drive in self.drives:
+            drive.forget_owed()
+        self._is_cyclic = True
+        timeout = self._bus.timeouts.boot
+        yield from together(
+            node.wait(
+                lambda node=node: node.got_tpdo and node.nmt == OPERATIONAL,  # type: ignore[misc]
+                timeout,
+                "not operational",
+            )
+            for node in self.nodes
+        )
+        if not self.io.is_chain_closed:
+            raise BusError("e-stop: the chain is open.")
+        yield from together([drive.enable() for drive in self.drives])
+        for drive in self.drives:
+            yield from drive.home()
+        self._follower.stand(self._actual()[0])
+        self.phase = Phase.ENABLED
+
+    def _switch_off(self, standing: float) -> Script:
+        """Waits until the arm stands, at a time, s; then brakes and power."""
+        self.io.trigger = 0.0
+        while self._now < standing:
+            yield
+        self._follower.release()
+        if self._is_cyclic:
+            yield from together([drive.disable() for drive in self.drives])
+        self._is_cyclic = False
+        self.phase = Phase.DOWN
+
+    # The cycle's parts.
+
+    def _follow(self, now: float) -> None:
+        """Takes the command of this cycle to the drives."""
+        follower = self._follower
+        if self.phase != Phase.ENABLED and not follower.is_braking:
+            return
+        problem = follower.step(now)
+        if problem is not None:
+            self.stop(problem)
+            follower.step(now)
+        self.io.trigger = follower.trigger
+        axes = axes_from_joints(follower.q)
+        for drive, angle in zip(self.drives, axes, strict=True):
+            drive.target = drive.units.counts(float(angle))
+
+    def _actual(self) -> tuple[FloatArray, FloatArray]:
+        """Positions and speeds of the joints as the drives last said."""
+        axes = np.array([d.units.angle(d.position) for d in self.drives])
+        speeds = np.array([d.units.speed(d.velocity) for d in self.drives])
+        return joints_from_axes(axes), joints_from_axes(speeds)
+
+    def _note_measured(self) -> None:
+        """Passes on what answered the last SYNC, if all of it came."""
+        if self._last_cycle is not None and all(d.is_measured for d in self.drives):
+            self.measured(self._last_cycle, *self._actual(), self.io.trigger)
+
+    def _send_outputs(self) -> None:
+        if not self._is_cyclic:
+            return
+        self.io.tell()  # First, so that the gun is never last.
+        for drive in self.drives:
+            self._send(drive.rpdo())
+
+    def _expect_answers(self) -> None:
+        came = [drive.expect_answer() for drive in self.drives]
+        if self._counts["cycles"] > 0:
+            self._counts["missing"] += came.count(False)
+        # Scripts that wait for a new one clear the flag themselves.
+        if self.phase != Phase.STARTING:
+            for drive in self.drives:
+                drive.got_tpdo = False
+
+    # The watches.
+
+    def _watch(self, now: float) -> None:
+        for node in self.nodes:
+            if node.alarm is not None and self._is_cyclic:
+                alarm, node.alarm = node.alarm, None
+                if self.phase != Phase.STARTING or not node.is_configured:
+                    self.stop(alarm, quick=True)
+        if self.phase not in (Phase.ENABLED, Phase.STOPPED) or not self._is_cyclic:
+            return
+        held = self.phase == Phase.ENABLED or self._follower.is_braking
+        complaint = first_complaint(
+            self._bus, self.drives, self.io, now=now, must_be_enabled=held
+        )
+        if complaint is not None and held:
+            self.stop(complaint, quick=True)
+
+    # The link.
+
+    def _take(self, frame: Frame, now: float) -> None:
+        self._meter.note(frame, self._now)
+        if frame.is_error:
+            if frame.cob_id & ERROR_BUS_OFF:
+                self._lose("bus-off: the CAN controller gave up.")
+            return
+        node = self._by_id.get(frame.cob_id & 0x7F)
+        if node is None or frame.cob_id < SYNC_ID:
+            self._counts["foreign"] += 1
+        elif not node.take(frame, now):
+            self._counts["malformed"] += 1
+
+    def _send(self, frame: Frame) -> None:
+        if self._is_lost:
+            return
+        self._meter.note(frame, self._now)
+        try:
+            self._link.send(frame)
+        except LinkError as error:
+            self._lose(f"bus lost: {error}")
+
+    def _lose(self, reason: str) -> None:
+        self._is_lost = True
+        self._reopen_at = self._now + _REOPEN_EVERY
+        self.stop(reason, quick=True)
+
+    def _reopen(self, now: float) -> None:
+        if now < self._reopen_at:
+            return
+        self._reopen_at = now + _REOPEN_EVERY
+        try:
+            self._link.reopen()
+        except LinkError as error:
+            _LOGGER.debug("still lost: %s", error)
+            return
+        _LOGGER.warning("the bus is back; the stop stays until it is acknowledged.")
+        self._is_lost = False
+        for node in self.nodes:
+            node.heard = now
+            node.missed = 0

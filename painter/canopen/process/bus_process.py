@@ -1,0 +1,362 @@
+"""The bus in a process of its own, so that no computation holds up a SYNC.
+
+`BusProcess` is the diagram's side: it never waits for the bus. Feedback comes through a
+mailbox in shared memory, commands and setpoints go through a pipe of which the bus
+takes what is there each cycle. When this side dies the pipe ends: the bus stops the
+arm, closes the gun and switches off. When the bus process dies the drives miss the
+master's heartbeat and stop by 6007h.
+"""
+
+import contextlib
+import logging
+import multiprocessing
+import os
+import select
+import signal
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from types import TracebackType
+
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.master.arm_bus import ArmBus
+from painter.canopen.master.feedback import Feedback, Phase
+from painter.canopen.master.setpoints import Setpoint
+from painter.canopen.process.mailbox import Mailbox
+from painter.canopen.process.realtime import (
+    Lateness,
+    Ticker,
+    lock_memory,
+    settle_memory,
+    stay_awake,
+    use_fifo,
+)
+from painter.canopen.process.sample_ring import SampleRing, Samples
+from painter.canopen.wire.frame_log import FrameLogger, TappedLink
+from painter.canopen.wire.links import Link, open_link
+from painter.errors import BusError, PainterError
+from painter.timebase import TimeBase
+
+_LOGGER = logging.getLogger(__name__)
+_SWITCH_OFF_TIME = 5.0
+_STOP_TIME = 1.0
+_MOST_COMMANDS = 64
+_POINTS_AT_ONCE = 6
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the bus process puts into its mailbox each cycle.
+
+    Attributes:
+        feedback: State of the arm.
+        refusal: Why the last command was refused; empty if it was not.
+        lateness: How late cycles began; renewed every second.
+        is_fifo: Whether the loop runs under SCHED_FIFO.
+    """
+
+    feedback: Feedback
+    refusal: str = ""
+    lateness: Lateness | None = None
+    is_fifo: bool = False
+
+
+class BusLoop:
+    """The loop that calls the master in real time; runs in the bus process."""
+
+    def __init__(
+        self,
+        bus: BusConfig,
+        commands: Connection,
+        mailbox: Mailbox,
+        ring: SampleRing,
+        log: Connection | None = None,
+        clock: TimeBase | None = None,
+    ) -> None:
+        """Connects to the bus.
+
+        Args:
+            bus: What is on the bus.
+            commands: Where commands come from.
+            mailbox: Where reports go.
+            ring: Where measured samples go.
+            log: Pipe of a `FrameLogger`, or None.
+            clock: The run's; None = the machine's.
+
+        Raises:
+            PainterError: The link cannot be opened, or an EDS not be used.
+        """
+        self._clock = clock or TimeBase()
+        link = open_link(bus)
+        self._link: Link = link if log is None else TappedLink(link, log, self._clock)
+        self._master = ArmBus(bus, self._link)
+        self._commands = commands
+        self._mailbox = mailbox
+        self._ticker = Ticker(bus.cycle, self._clock)
+        self._master.before_sync = self._ticker.meet
+        self._master.measured = ring.put
+        self._refusal = ""
+        self._lateness: Lateness | None = None
+        self._is_fifo = False
+        self._end_at: float | None = None
+
+    def run(self) -> None:
+        """Runs until the other side asks to end, or is gone, and the arm is off."""
+        self._is_fifo = use_fifo()
+        settle_memory()
+        lock_memory()
+        with stay_awake():
+            self._cycle_until_ended()
+        self._link.close()
+
+    def _cycle_until_ended(self) -> None:
+        per_second = max(1, round(1.0 / self._ticker.period))
+        count = 0
+        self._ticker.begin()  # Locking took a second.
+        while not self._has_ended():
+            while (remaining := self._ticker.remaining()) > 0.0:
+                # Frames between two SYNCs are read at once: a fault need not wait.
+                now = self._clock.now()
+                again = max(0.0, self._clock.machine(self._master.io.again_at - now))
+                self._master.poll(now, min(remaining, again))
+                if self._ticker.remaining() > 0.0:
+                    self._pause()
+            due, skipped = self._ticker.tick()
+            self._master.cycle(due, overruns=skipped)
+            self._take_commands()
+            count += 1
+            if count % per_second == 0:
+                self._lateness = self._ticker.lateness()
+            self._mailbox.put(
+                Report(
+                    self._master.feedback(),
+                    self._refusal,
+                    self._lateness,
+                    self._is_fifo,
+                )
+            )
+
+    def _pause(self) -> None:
+        """Leaves the processor for a moment while the link cannot be waited for."""
+        if self._master.is_lost:
+            time.sleep(self._ticker.remaining())
+
+    def _has_ended(self) -> bool:
+        if self._end_at is None:
+            return False
+        is_off = self._master.phase in (Phase.DOWN, Phase.STOPPED)
+        return (is_off and self._master.is_idle) or self._clock.now() > self._end_at
+
+    def _take_commands(self) -> None:
+        if self._end_at is not None:
+            return
+        try:
+            for _ in range(_MOST_COMMANDS):
+                if not self._commands.poll():
+                    return
+                self._do(self._commands.recv())
+        except (EOFError, OSError):
+            self._master.stop("the program that commands the arm is gone.")
+            self._end(_STOP_TIME)
+
+    def _do(self, command: tuple[str, object]) -> None:
+        word, argument = command
+        try:
+            if word == "push":
+                self._master.push(argument)  # type: ignore[arg-type]
+            elif word == "start":
+                self._master.start()
+            elif word == "stop":
+                self._master.stop(str(argument))
+            elif word == "acknowledge":
+                self._refusal = ""
+                self._master.acknowledge()
+            elif word == "end":
+                self._end(0.0)
+        except (BusError, ValueError) as error:
+            self._refusal = str(error)
+            if isinstance(error, ValueError):
+                self._master.stop(f"setpoints: {error}")
+
+    def _end(self, wait: float) -> None:
+        """Lets a stop finish, then switches off."""
+        deadline = self._clock.now() + wait
+        while self._clock.now() < deadline:
+            time.sleep(self._ticker.remaining())
+            due, skipped = self._ticker.tick()
+            self._master.cycle(due, overruns=skipped)
+        self._end_at = self._clock.now() + _SWITCH_OFF_TIME
+        self._master.shut_down()
+
+
+class BusProcess:
+    """The diagram's side of the bus; a context manager that switches off at its end."""
+
+    def __init__(
+        self,
+        bus: BusConfig,
+        *,
+        log: Path | None = None,
+        clock: TimeBase | None = None,
+    ) -> None:
+        """Starts the process; the bus itself is begun by `start`.
+
+        Args:
+            bus: What is on the bus.
+            log: Where to write all frames in candump's format, or None.
+            clock: The run's; None = the machine's.
+
+        Raises:
+            InputError: The log cannot be written.
+        """
+        self.clock = clock or TimeBase()
+        self._logger = None if log is None else FrameLogger(log, bus.channel)
+        pipe = None if self._logger is None else self._logger.pipe
+        context = multiprocessing.get_context("spawn")
+        theirs, self._commands = context.Pipe(duplex=False)
+        self._mailbox = Mailbox()
+        self._ring = SampleRing()
+        self._errors, errors = context.Pipe(duplex=False)
+        self._process = context.Process(
+            target=_run,
+            args=(
+                bus,
+                theirs,
+                self._mailbox.name,
+                self._ring.name,
+                errors,
+                pipe,
+                self.clock,
+            ),
+            name="painter bus",
+            daemon=False,
+        )
+        self._process.start()
+        theirs.close()
+        errors.close()
+        if pipe is not None:
+            pipe.close()  # So that the log ends when the bus process does.
+
+    def __enter__(self) -> "BusProcess":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def pid(self) -> int:
+        """Identifier of the bus process."""
+        assert self._process.pid is not None
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the bus process runs."""
+        return self._process.is_alive()
+
+    def start(self) -> None:
+        """Asks for bring-up; the feedback tells how it goes."""
+        self._send("start")
+
+    def push(self, points: Sequence[Setpoint]) -> None:
+        """Sends setpoints.
+
+        Raises:
+            BusError: The bus process has ended or takes nothing any more.
+        """
+        for i in range(0, len(points), _POINTS_AT_ONCE):
+            self._send("push", list(points[i : i + _POINTS_AT_ONCE]))
+
+    def stop(self, reason: str) -> None:
+        """Asks for a controlled stop."""
+        self._send("stop", reason)
+
+    def acknowledge(self) -> None:
+        """Asks to begin again after a stop; a refusal is in the report."""
+        self._send("acknowledge")
+
+    def report(self) -> Report | None:
+        """Returns the newest report; None before the first one.
+
+        Raises:
+            BusError: The bus process has ended; says why where it could.
+        """
+        if not self._process.is_alive():
+            raise BusError(f"the bus process has ended: {self._last_words()}")
+        found = self._mailbox.get()
+        return None if found is None else found[1]
+
+    def samples(self, since: float) -> Samples:
+        """Returns what was measured after a time, s on the bus's clock."""
+        return self._ring.since(since)
+
+    def now(self) -> float:
+        """Returns the bus's clock, s."""
+        return self.clock.now()
+
+    def wait_until(self, when: float) -> None:
+        """Waits for a time, s, of the bus's clock."""
+        self.clock.sleep(when - self.clock.now())
+
+    def close(self) -> None:
+        """Switches the arm off and ends the process."""
+        with contextlib.suppress(BusError):
+            self._send("end")
+        self._process.join(self.clock.machine(_SWITCH_OFF_TIME + _STOP_TIME))
+        if self._process.is_alive():
+            _LOGGER.error("the bus process did not end; killed.")
+            self._process.kill()
+            self._process.join()
+        self._commands.close()
+        self._mailbox.close()
+        self._ring.close()
+        if self._logger is not None:
+            self._logger.close()
+
+    def _send(self, word: str, argument: object = None) -> None:
+        # A pipe that can be written to has room for 4096 bytes (POSIX: PIPE_BUF), and
+        # no command is longer: this never waits.
+        _, ready, _ = select.select([], [self._commands], [], 0.0)
+        if not ready:
+            raise BusError("the bus process does not take commands any more.")
+        try:
+            self._commands.send((word, argument))
+        except (BrokenPipeError, OSError) as error:
+            raise BusError(
+                f"the bus process has ended: {self._last_words()}"
+            ) from error
+
+    def _last_words(self) -> str:
+        with contextlib.suppress(EOFError, OSError):
+            if self._errors.poll():
+                return str(self._errors.recv())
+        return f"exit code {self._process.exitcode}."
+
+
+def _run(
+    bus: BusConfig,
+    commands: Connection,
+    mailbox_name: str,
+    ring_name: str,
+    errors: Connection,
+    log: Connection | None,
+    clock: TimeBase,
+) -> None:
+    """The bus process: Ctrl-C is the parent's business, which then ends the pipe."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    mailbox, ring = Mailbox(name=mailbox_name), SampleRing(name=ring_name)
+    try:
+        BusLoop(bus, commands, mailbox, ring, log, clock).run()
+    except PainterError as error:
+        errors.send(str(error))
+        os._exit(1)
+    finally:
+        mailbox.close()
+        ring.close()

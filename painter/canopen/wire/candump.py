@@ -1,0 +1,129 @@
+"""Logs of a bus in candump's format: one frame a line, as `candump -L` writes them.
+
+    (1436509052.249713) can0 185#2712A0860100 R
+
+Source: can-utils, lib.c (sprint_canframe) and canlogserver's manual: three digits of an
+11-bit identifier, eight of a 29-bit one or, with flag 20000000h, of an error frame;
+`#R` marks a remote frame, `##` CAN FD; a trailing T or R says sent or received.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from painter.canopen.protocol.frames import Frame
+from painter.errors import InputError
+
+# Source: Linux, include/uapi/linux/can.h, CAN_ERR_FLAG.
+_ERROR_FLAG = 0x20000000
+_LINE = re.compile(
+    r"\((?P<time>\d+\.\d+)\) (?P<channel>\S+) (?P<id>[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
+    r"#(?P<rest>\S*)(?: (?P<way>[TR]))?"
+)
+_DATA = re.compile(r"(?:[0-9A-Fa-f]{2}){0,8}")
+
+
+@dataclass(frozen=True, slots=True)
+class LogRecord:
+    """One line of a log.
+
+    Attributes:
+        time: When the frame passed, s; in logs from the bus process since 1970 (UTC).
+        frame: The frame.
+        is_sent: True if the master sent it, False if it came, None if the log does not
+            say.
+    """
+
+    time: float
+    frame: Frame
+    is_sent: bool | None = None
+
+
+@dataclass(frozen=True)
+class BusLog:
+    """A whole log.
+
+    Attributes:
+        records: Frames of CANopen's kind and error frames, as they stand in the file.
+        foreign: How many lines held extended, remote or CAN FD frames, left out.
+    """
+
+    records: list[LogRecord]
+    foreign: int = 0
+
+
+def format_record(record: LogRecord, channel: str) -> str:
+    """Returns a record as a line without its end."""
+    frame = record.frame
+    if frame.is_error:
+        cob_id = f"{_ERROR_FLAG | frame.cob_id:08X}"
+    else:
+        cob_id = f"{frame.cob_id:03X}"
+    way = {True: " T", False: " R", None: ""}[record.is_sent]
+    data = frame.data.hex().upper()
+    return f"({record.time:017.6f}) {channel} {cob_id}#{data}{way}"
+
+
+def parse_line(line: str) -> LogRecord | None:
+    """Reads a line; None for a frame that is not of CANopen's kind.
+
+    Raises:
+        ValueError: It is no line of a log.
+    """
+    match = _LINE.fullmatch(line)
+    if match is None:
+        raise ValueError(f"expected '(time) channel id#data', got {line[:60]!r}.")
+    cob_id, rest = int(match["id"], 16), match["rest"]
+    is_error = len(match["id"]) == 8 and bool(cob_id & _ERROR_FLAG)
+    is_extended = len(match["id"]) == 8 and not is_error
+    if is_extended or rest[:1] in ("R", "#"):
+        return None
+    if not _DATA.fullmatch(rest):
+        raise ValueError(f"expected up to 8 bytes in hex after #, got {rest[:40]!r}.")
+    limit = _ERROR_FLAG - 1 if is_error else 0x7FF
+    if not is_error and cob_id > limit:
+        raise ValueError(f"an 11-bit identifier is at most 7FF, got {cob_id:X}.")
+    frame = Frame(cob_id & limit, bytes.fromhex(rest), is_error=is_error)
+    way = match["way"]
+    return LogRecord(float(match["time"]), frame, None if way is None else way == "T")
+
+
+def read_lines(path: Path) -> Iterator[LogRecord | None]:
+    """Reads a log line by line; None for a frame that is not of CANopen's kind.
+
+    A last line without its end is left out: who wrote it was stopped amid the line.
+
+    Raises:
+        InputError: The file cannot be read, or a line is none of a log; names both.
+    """
+    try:
+        with path.open(encoding="ascii") as lines:
+            for number, line in enumerate(lines, start=1):
+                if not line.endswith("\n"):
+                    return
+                if line.isspace():
+                    continue
+                try:
+                    yield parse_line(line.rstrip())
+                except ValueError as error:
+                    raise InputError(f"{path}: line {number}: {error}") from None
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such log.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a candump log: it is not text.") from None
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}.") from error
+
+
+def read_log(path: Path) -> BusLog:
+    """Reads a whole log.
+
+    Raises:
+        InputError: As `read_lines`, or it holds no frames.
+    """
+    found = list(read_lines(path))
+    records = [record for record in found if record is not None]
+    if not records:
+        raise InputError(f"{path}: holds no CANopen frames.")
+    return BusLog(records, len(found) - len(records))

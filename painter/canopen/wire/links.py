@@ -1,0 +1,215 @@
+"""Ways to a bus: any python-can interface, or a socket on this machine."""
+
+import select
+import socket
+import struct
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+import can
+
+from painter.canopen.config.bus_config import BusConfig
+from painter.canopen.protocol.frames import Frame
+from painter.errors import BusError
+
+# One frame in a packet: identifier, length, padding, data; as Linux's struct can_frame.
+_LAYOUT = struct.Struct("<IB3x8s")
+_MOST_AT_ONCE = 256
+T = TypeVar("T")
+
+
+class LinkError(BusError):
+    """The way to the bus is lost; it may be opened again."""
+
+
+class Link(Protocol):
+    """A way to a bus, for one thread."""
+
+    def send(self, frame: Frame) -> None:
+        """Sends a frame; raises LinkError when the way is lost."""
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Returns frames that came; waits up to `timeout` s for the first one."""
+
+    def reopen(self) -> None:
+        """Opens the way again; raises LinkError when it cannot be."""
+
+    def close(self) -> None:
+        """Gives the way up."""
+
+
+def open_link(bus: BusConfig) -> Link:
+    """Opens the interface and channel that a bus file names.
+
+    Raises:
+        LinkError: It cannot be opened; names both.
+    """
+    if bus.interface == "local":
+        return LocalLink(bus.channel)
+    return CanLink(bus.interface, bus.channel, bus.bitrate)
+
+
+class CanLink:
+    """A python-can interface."""
+
+    def __init__(self, interface: str, channel: str, bitrate: int) -> None:
+        """Opens it.
+
+        Raises:
+            LinkError: It cannot be opened.
+        """
+        self._options = (interface, channel, bitrate)
+        self._bus: can.BusABC | None = None
+        # udp_multicast hands a bus its own frames back.
+        self._echoes = interface == "udp_multicast"
+        self._own: list[tuple[int, bytes]] = []
+        self.reopen()
+
+    def reopen(self) -> None:
+        """Opens the interface anew: a python-can bus that failed stays failed."""
+        self.close()
+        interface, channel, bitrate = self._options
+        extra: dict[str, Any] = {"fd": False} if self._echoes else {}
+        try:
+            self._bus = can.Bus(
+                interface=interface,
+                channel=channel,
+                bitrate=bitrate,
+                receive_own_messages=False,
+                **extra,
+            )
+        except (can.CanError, OSError, ValueError, ImportError) as error:
+            text = " ".join(str(error).split())
+            raise LinkError(f"{interface} {channel}: {text}") from error
+
+    def send(self, frame: Frame) -> None:
+        """Sends a frame."""
+        if self._bus is None:
+            raise LinkError("the CAN interface is closed.")
+        if self._echoes:
+            self._own = [*self._own[-255:], (frame.cob_id, frame.data)]
+        message = can.Message(
+            arbitration_id=frame.cob_id, data=frame.data, is_extended_id=False
+        )
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise LinkError(f"sending failed: {error}") from error
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Returns frames that came; waits up to `timeout` s for the first one."""
+        if self._bus is None:
+            raise LinkError("the CAN interface is closed.")
+        frames: list[Frame] = []
+        try:
+            message = self._bus.recv(timeout)
+            while message is not None and len(frames) < _MOST_AT_ONCE:
+                self._take(message, frames)
+                message = self._bus.recv(0.0)
+            if message is not None:
+                self._take(message, frames)
+        except (can.CanError, OSError) as error:
+            raise LinkError(f"receiving failed: {error}") from error
+        return frames
+
+    def close(self) -> None:
+        """Closes the interface."""
+        if self._bus is not None:
+            with suppress(can.CanError, OSError):
+                self._bus.shutdown()
+            self._bus = None
+
+    def _take(self, message: can.Message, frames: list[Frame]) -> None:
+        data = bytes(message.data)
+        if self._echoes and (message.arbitration_id, data) in self._own:
+            self._own.remove((message.arbitration_id, data))
+            return
+        if message.is_error_frame:
+            frames.append(Frame(message.arbitration_id, data, is_error=True))
+        elif not (message.is_extended_id or message.is_remote_frame or message.is_fd):
+            frames.append(Frame(message.arbitration_id, data))
+
+
+def pack_frame(frame: Frame) -> bytes:
+    """Returns a frame as one packet of a local socket."""
+    return _LAYOUT.pack(frame.cob_id, len(frame.data), frame.data)
+
+
+def unpack_frame(packet: bytes) -> Frame | None:
+    """Returns the frame of a packet; None if it holds none."""
+    if len(packet) != _LAYOUT.size:
+        return None
+    cob_id, length, data = _LAYOUT.unpack(packet)
+    if cob_id > 0x7FF or length > 8:
+        return None
+    return Frame(cob_id, data[:length])
+
+
+class LocalLink:
+    """A lossless socket to `painter drives` on this machine."""
+
+    def __init__(self, path: str) -> None:
+        """Connects.
+
+        Raises:
+            LinkError: Nobody listens there.
+        """
+        self._path = path
+        self._socket: socket.socket | None = None
+        self.reopen()
+
+    def reopen(self) -> None:
+        """Connects anew."""
+        self.close()
+        link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        try:
+            link.connect(self._path)
+        except OSError as error:
+            link.close()
+            raise LinkError(f"local {self._path}: {error.strerror}.") from error
+        self._socket = link
+
+    def send(self, frame: Frame) -> None:
+        """Sends a frame."""
+        self._do(lambda link: link.send(pack_frame(frame)))
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Returns frames that came; waits up to `timeout` s for the first one."""
+        frames: list[Frame] = []
+        wait = max(timeout, 0.0)
+        while len(frames) < _MOST_AT_ONCE:
+            packet = self._do(partial(_receive, wait=wait))
+            if packet is None:
+                break
+            frame = unpack_frame(packet)
+            if frame is not None:
+                frames.append(frame)
+            wait = 0.0
+        return frames
+
+    def close(self) -> None:
+        """Disconnects."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _do(self, act: Callable[[socket.socket], T]) -> T:
+        if self._socket is None:
+            raise LinkError(f"local {self._path}: not connected.")
+        try:
+            return act(self._socket)
+        except OSError as error:
+            raise LinkError(f"local {self._path}: {error.strerror}.") from error
+
+
+def _receive(link: socket.socket, *, wait: float) -> bytes | None:
+    # select() waits to the microsecond; a socket's own time-out is whole milliseconds.
+    ready, _, _ = select.select([link], [], [], wait)
+    if not ready:
+        return None
+    packet = link.recv(64)
+    if not packet:
+        raise ConnectionResetError(104, "the other side closed")
+    return packet

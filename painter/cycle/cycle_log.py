@@ -1,0 +1,100 @@
+"""What one paint cycle leaves, on either body."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from painter.planning.arm.kinematics import ArmKinematics
+from painter.planning.spray_path import PaintProgram
+from painter.systems.simulated.paint_film import FilmState
+from painter.systems.values import (
+    CycleStatus,
+    FollowerStatus,
+)
+from perception.ground import FloatArray, FrozenValue
+from perception.values import SurfaceMap, WallSegmentation
+
+NQ = 5
+LOG_PERIOD = 0.01
+CLEARANCE_PERIOD = 0.05
+# Robot time between looks at the cycle from outside, s.
+WATCH_PERIOD = 0.1
+
+# Sees the robot's time, s, and both statuses; may return a word of the operator's.
+Watch = Callable[[float, CycleStatus, FollowerStatus], str | None]
+
+
+@dataclass(frozen=True, eq=False)
+class CycleLog(FrozenValue):
+    """What a cycle leaves; parts it did not come to are None.
+
+    Attributes:
+        status: The cycle's last status, with all events.
+        end_time: Robot time at which the simulation stopped, s.
+        time: (n,) s, of the samples below.
+        q: (n, 5) rad, measured.
+        v: (n, 5) rad/s, measured.
+        trigger: (n,) as the gun received it.
+        X_WG: (n, 4, 4) nozzle poses in W: true ones, or measured where nobody knows.
+        X_WG_desired: (n, 4, 4) nozzle poses of the desired joint state.
+        clearance_time: (k,) s; nothing where nobody knows clearances.
+        clearance: (k,) m, least distance of the robot from the scene.
+        floor_clearance: (k,) m, the same from the floor and the robot's own frame.
+        surface_map: The fused map.
+        segmentation: The wall's segmentation, or None.
+        program: The paint program, or None.
+        film: The paint film at the end; None where nobody knows it.
+        look_image: (H, W, 4) uint8, colour picture of first sight, or None.
+    """
+
+    status: CycleStatus
+    end_time: float
+    time: FloatArray
+    q: FloatArray
+    v: FloatArray
+    trigger: FloatArray
+    X_WG: FloatArray
+    X_WG_desired: FloatArray
+    clearance_time: FloatArray
+    clearance: FloatArray
+    floor_clearance: FloatArray
+    surface_map: SurfaceMap
+    segmentation: WallSegmentation | None
+    program: PaintProgram | None
+    film: FilmState | None
+    look_image: npt.NDArray[np.uint8] | None
+
+
+def GunPoses(kinematics: ArmKinematics, q: FloatArray) -> FloatArray:
+    """Returns (n, 4, 4) nozzle poses in W of joint positions (n, 5), rad."""
+    R_WG, p_WG = kinematics.gun_poses(q)
+    poses = np.tile(np.eye(4), (len(q), 1, 1))
+    poses[:, :3, :3] = R_WG
+    poses[:, :3, 3] = p_WG
+    return poses
+
+
+def clearance_violations(
+    time: FloatArray, clearance: FloatArray, bound: float
+) -> list[tuple[float, float]]:
+    """Finds the episodes in which the robot came too close to something.
+
+    Args:
+        time: (k,) s.
+        clearance: (k,) m.
+        bound: Least distance allowed, m.
+
+    Returns:
+        (time of the least distance, that distance) of each unbroken episode below the
+        bound, in order.
+    """
+    below = np.concatenate([[False], clearance < bound, [False]])
+    starts = np.flatnonzero(below[1:] & ~below[:-1])
+    ends = np.flatnonzero(~below[1:] & below[:-1])
+    worst = [
+        start + int(np.argmin(clearance[start:end]))
+        for start, end in zip(starts, ends, strict=True)
+    ]
+    return [(float(time[index]), float(clearance[index])) for index in worst]

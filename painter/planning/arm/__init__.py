@@ -1,0 +1,4 @@
+"""The arm as geometry: kinematics, reach, base placement.
+
+No clearance and no time.
+"""

@@ -1,0 +1,168 @@
+"""Which part of a tile a base placement reaches, to spray it and to see it.
+
+A placement is the wall's distance from the base axis and the shoulder's height over
+the floor. A point of the tile is sprayed if the nozzle can stand square before it at
+the spray stand-off; it is seen if it lies in a picture from a place where the camera
+can stand square before the wall at the scan distance. Both with the elbow up, within
+the joint limits and free of collisions.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.config import TileConfig
+from painter.planning.tile import grid_points, nominal_tile_pose
+from perception.ground import BoolArray, FloatArray, FrozenValue
+
+
+@dataclass(frozen=True, eq=False)
+class ReachTask(FrozenValue):
+    """What the arm is asked to do before a tile.
+
+    Attributes:
+        standoff: Nozzle to wall, m.
+        scan_distance: Camera to wall, m.
+        picture_width: Width of wall in one picture at that distance, m.
+        picture_height: Height of the same, m.
+        margin: The pictures are to reach this far beyond the tile's edge, m.
+    """
+
+    standoff: float
+    scan_distance: float
+    picture_width: float
+    picture_height: float
+    margin: float
+
+    @classmethod
+    def make(
+        cls,
+        *,
+        standoff: float,
+        scan_distance: float,
+        hfov_deg: float,
+        vfov_deg: float,
+        margin: float,
+    ) -> "ReachTask":
+        """Makes a task from the camera's fields of view, both full angles."""
+        return cls(
+            standoff=standoff,
+            scan_distance=scan_distance,
+            picture_width=2.0 * scan_distance * math.tan(math.radians(hfov_deg) / 2.0),
+            picture_height=2.0 * scan_distance * math.tan(math.radians(vfov_deg) / 2.0),
+            margin=margin,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class TileReach(FrozenValue):
+    """What one placement reaches of a tile; row 0 at the bottom.
+
+    Attributes:
+        x: (nx,) m, columns in T, over the tile and what is around it.
+        y: (ny,) m, rows in T, likewise.
+        on_tile: (ny, nx); True on the tile.
+        to_see: (ny, nx); True on the tile and the margin that pictures are to reach.
+        sprayed: (ny, nx); the nozzle can stand before the point.
+        camera_at: (ny, nx); the camera can stand before the point.
+        seen: (ny, nx); the point is in a picture from such a place.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    on_tile: BoolArray
+    to_see: BoolArray
+    sprayed: BoolArray
+    camera_at: BoolArray
+    seen: BoolArray
+
+    @property
+    def spray_share(self) -> float:
+        """Share of the tile that can be sprayed."""
+        return float(self.sprayed[self.on_tile].mean())
+
+    @property
+    def scan_share(self) -> float:
+        """Share of the tile and its margin that can be seen."""
+        return float(self.seen[self.to_see].mean())
+
+
+def tile_reach(
+    arm: ArmKinematics,
+    limits: ArmLimits,
+    tile: TileConfig,
+    task: ReachTask,
+    *,
+    is_free: Callable[[FloatArray], BoolArray],
+    step: float = 0.05,
+    around: float = 0.0,
+) -> TileReach:
+    """Computes what the arm reaches of a tile from where it stands.
+
+    Args:
+        arm: Kinematics, in W.
+        limits: Joint limits.
+        tile: The tile; its distance and height over the floor are the placement.
+        task: What is to be done.
+        is_free: Tells which rows of positions (n, 5), rad, are free of collisions.
+        step: Spacing of the points, m; points lie on the tile's edges.
+        around: How far beyond the tile to look, m; at least the task's margin.
+    """
+    around = max(around, task.margin)
+    x, y = _ticks(tile.width, around, step), _ticks(tile.height, around, step)
+    shape = (len(y), len(x))
+    X_WT = nominal_tile_pose(tile)
+    ahead_W = -X_WT.rotation().col(2)
+
+    def reached(solve: Callable[..., FloatArray], distance: float) -> BoolArray:
+        q = solve((X_WT @ grid_points(x, y, distance)).T, ahead_W, elbow=1)
+        mask = limits.contains(q)
+        if mask.any():
+            mask[mask] = is_free(q[mask])
+        return mask.reshape(shape)
+
+    camera_at = reached(arm.solve_camera, task.scan_distance)
+    sees_x = np.abs(x[:, None] - x) <= task.picture_width / 2.0
+    sees_y = np.abs(y[:, None] - y) <= task.picture_height / 2.0
+    return TileReach(
+        x=x,
+        y=y,
+        on_tile=_within(x, y, tile, 0.0),
+        to_see=_within(x, y, tile, task.margin),
+        sprayed=reached(arm.solve, task.standoff),
+        camera_at=camera_at,
+        seen=(sees_y.astype(int) @ camera_at.astype(int) @ sees_x.astype(int)) > 0,
+    )
+
+
+def placement(tile: TileConfig, *, distance: float, raised: float) -> TileConfig:
+    """Returns the tile as an arm sees it that stands elsewhere.
+
+    Args:
+        tile: The tile before the arm as modelled.
+        distance: Of the wall from the base axis, m.
+        raised: How much higher than modelled the shoulder is, m.
+    """
+    return dataclasses.replace(tile, distance=distance, bottom=tile.bottom - raised)
+
+
+def _ticks(length: float, around: float, step: float) -> FloatArray:
+    """Evenly spaced coordinates with both edges, and both outer ends, among them."""
+    steps = round(length / step)
+    outside = math.ceil(around / step)
+    ticks = np.arange(-outside, steps + outside + 1) * (length / steps)
+    clipped: FloatArray = np.clip(ticks, -around, length + around)
+    return clipped
+
+
+def _within(x: FloatArray, y: FloatArray, tile: TileConfig, margin: float) -> BoolArray:
+    # Rounding moves a point on the edge by less than this.
+    margin += 1e-9
+    on_x = (x >= -margin) & (x <= tile.width + margin)
+    on_y = (y >= -margin) & (y <= tile.height + margin)
+    within: BoolArray = on_y[:, None] & on_x
+    return within

@@ -1,0 +1,4 @@
+"""Arm motion: blends, gun paths, transitions between strokes, dense verification.
+
+Knows nothing of film.
+"""

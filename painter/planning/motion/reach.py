@@ -1,0 +1,139 @@
+"""Whether the arm reaches what it is asked for, and if not, by how much."""
+
+import math
+
+import numpy as np
+
+from painter.errors import ReachError
+from painter.planning.arm.kinematics import ArmLimits
+from painter.planning.motion.gun_path import SquareGun
+from perception.ground import FloatArray
+
+_REACH_STEP = 0.05  # m, between the places at which reach is asked for ...
+_STANDOFF_STEP = 0.015  # m, ... and between the stand-offs.
+_JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
+
+
+def tile_points(width: float, height: float, standoff: float) -> FloatArray:
+    """Returns nozzle positions all over a tile and its edges, 10 cm apart.
+
+    Args:
+        width: Of the tile, m.
+        height: Of the tile, m.
+        standoff: Nozzle to wall, m.
+
+    Returns:
+        (n, 3) m, in T.
+    """
+    x = np.linspace(0.0, width, max(2, round(width / 0.1) + 1))
+    y = np.linspace(0.0, height, max(2, round(height / 0.1) + 1))
+    xs, ys = np.meshgrid(x, y)
+    return np.stack([xs.ravel(), ys.ravel(), np.full(xs.size, standoff)], axis=-1)
+
+
+def nearest_standoffs(
+    x: FloatArray,
+    y: FloatArray,
+    *,
+    gun: SquareGun,
+    limits: ArmLimits,
+    near: float,
+    far: float,
+    stopping: float,
+) -> FloatArray:
+    """Returns the least stand-offs from which strokes along T y can be sprayed.
+
+    The nearer the nozzle, the farther the arm has to stretch in a tile's corners. A
+    stroke may end wherever it may be: there must be room to stop beyond.
+
+    Args:
+        x: (nx,) m in T, ascending.
+        y: (ny,) m in T, ascending.
+        gun: Inverse kinematics.
+        limits: Of the joints.
+        near: Least stand-off that is asked for, m.
+        far: Of the raster, m; whether the arm reaches that is asked elsewhere.
+        stopping: In which the gun stops beyond a stroke's end, m.
+
+    Returns:
+        (ny, nx) m, `near` to `far`.
+    """
+    columns, rows = (_spread(axis, _REACH_STEP) for axis in (x, y))
+    standoffs = np.linspace(near, far, max(2, round((far - near) / _STANDOFF_STEP) + 1))
+    # Away from the middle is where reach ends.
+    beyond = rows + stopping * np.sign(rows - rows.mean())
+    places = np.meshgrid(standoffs, beyond, columns, indexing="ij")
+    p_TGs = np.stack([place.ravel() for place in places[::-1]], axis=-1)
+    reached = limits.contains(gun.solve(p_TGs)).reshape(places[0].shape)
+    # Out of reach up to the last stand-off at which it is.
+    first = np.where(reached, 0, np.arange(1, standoffs.size + 1)[:, None, None])
+    coarse = standoffs[np.minimum(first.max(axis=0), standoffs.size - 1)]
+    by_row = np.array([np.interp(x, columns, row) for row in coarse])
+    return np.stack([np.interp(y, rows, column) for column in by_row.T], axis=1)
+
+
+def _spread(axis: FloatArray, step: float) -> FloatArray:
+    """Returns evenly spaced places from one end of an axis to the other."""
+    count = max(2, math.ceil((axis[-1] - axis[0]) / step) + 1)
+    return np.linspace(axis[0], axis[-1], count)
+
+
+def require_reach(
+    p_TGs: FloatArray, *, gun: SquareGun, limits: ArmLimits, what: str
+) -> FloatArray:
+    """Solves for joint angles and raises if a point is out of reach.
+
+    Args:
+        p_TGs: (n, 3) m, nozzle positions in T.
+        gun: Inverse kinematics.
+        limits: Of the joints.
+        what: What the points belong to, for the message.
+
+    Returns:
+        (n, 5) rad.
+
+    Raises:
+        ReachError: Tells which share is out of reach, the worst point and its figures.
+    """
+    q = gun.solve(p_TGs)
+    bad = ~limits.contains(q)
+    if not bad.any():
+        return q
+    arm = gun.kinematics
+    needed = wrist_distances(p_TGs, gun)
+    longest = arm.upper_arm + arm.forearm
+    share = f"{what}: {100 * bad.mean():.0f} % of it is out of reach"
+    worst = int(np.argmax(np.where(bad, needed, -np.inf)))
+    x, y, z = p_TGs[worst]
+    place = f"T ({x:.2f}, {y:.2f}) m, {z:.2f} m before the wall"
+    if needed[worst] > longest:
+        raise ReachError(
+            f"{share}; {place}, needs {needed[worst]:.2f} m from shoulder to wrist, "
+            f"the arm has {longest:.2f} m."
+        )
+    worst = int(np.flatnonzero(bad)[0])
+    x, y, z = p_TGs[worst]
+    place = f"T ({x:.2f}, {y:.2f}) m, {z:.2f} m before the wall"
+    if np.isnan(q[worst]).any():
+        raise ReachError(
+            f"{share}; {place}, needs {needed[worst]:.2f} m from shoulder to wrist, "
+            f"the arm cannot fold below {abs(arm.upper_arm - arm.forearm):.2f} m."
+        )
+    excess = np.maximum(limits.q_min - q[worst], q[worst] - limits.q_max)
+    joint = int(np.argmax(excess))
+    raise ReachError(
+        f"{share}; {place}, needs {_JOINTS[joint]} at {q[worst, joint]:.2f} rad, its "
+        f"range is {limits.q_min[joint]:.2f} to {limits.q_max[joint]:.2f} rad."
+    )
+
+
+def wrist_distances(p_TGs: FloatArray, gun: SquareGun) -> FloatArray:
+    """Returns the shoulder-to-wrist distance (n,), m, that nozzle points (n, 3) need.
+
+    With the gun square to the wall L's axes in T are x = -z, y = -x, z = y.
+    """
+    ahead, left, above = gun.kinematics.X_LG.translation()
+    p_TLs = p_TGs - np.array([-left, above, -ahead])
+    p_WLs = (gun.X_WT @ p_TLs.T).T
+    p_WS = np.array([0.0, 0.0, gun.kinematics.shoulder_height])
+    return np.asarray(np.linalg.norm(p_WLs - p_WS, axis=1))

@@ -1,0 +1,223 @@
+"""From a segmentation to a paint program: strokes, their order in time, every move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.planning import CollisionChecker
+
+from painter.errors import InputError
+from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.clearance.obstacles import ClearSpace, segmentation_boxes
+from painter.planning.clearance.tool_shape import standoffs_beside, tool_boxes
+from painter.planning.config import MotionConfig, RasterConfig, TipConfig
+from painter.planning.film.film_model import Site, margin_cells
+from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.joint_motion import chain, planning_limits, start_times
+from painter.planning.motion.reach import nearest_standoffs
+from painter.planning.motion.surface_frame import SurfaceFrame, above_wall
+from painter.planning.motion.transitions import Linker
+from painter.planning.motion.verify import verify_motion, verify_strokes
+from painter.planning.program.clear_strokes import RUN_OUT, clear_strokes
+from painter.planning.program.stroke_links import link_strokes
+from painter.planning.spray_path import PaintProgram, Stroke
+from painter.planning.strokes.raster import plan_strokes, raster_film
+from painter.planning.strokes.touch_up import touch_up_strokes
+from painter.planning.tile import cell_centres
+from painter.planning.zones import in_zones
+from perception.ground import BoolArray, FloatArray, FrozenValue
+from perception.values import WallSegmentation
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramPlanner(FrozenValue):
+    """Plans paint programs for one robot with one set of settings.
+
+    Strokes that come nearer than the clearance to an obstacle, or out of reach, are cut
+    back; what is cut, and strokes that cannot be come to, stand in the program's
+    `skipped`. Where the wall is not flat the gun follows its surface; see
+    `SurfaceFrame`.
+
+    Attributes:
+        kinematics: Of the arm.
+        limits: Of its joints.
+        checker: Of the robot's cell: arm, frame and floor.
+        tip: The spray tip.
+        raster: Settings of the strokes.
+        motion: Settings of the motion.
+    """
+
+    kinematics: ArmKinematics
+    limits: ArmLimits
+    checker: CollisionChecker
+    tip: TipConfig
+    raster: RasterConfig
+    motion: MotionConfig
+
+    def strokes(self, segmentation: WallSegmentation) -> tuple[Stroke, ...]:
+        """Returns strokes over a tile's wall alone, as `plan_strokes` finds them."""
+        return plan_strokes(
+            np.asarray(segmentation.wall_mask),
+            segmentation.cell,
+            tip=self.tip,
+            raster=self.raster,
+            height=above_wall(segmentation),
+            nearest=self._nearest(segmentation),
+        )
+
+    def wanted(self, segmentation: WallSegmentation) -> BoolArray:
+        """Returns the wall (ny, nx) that the operator's zones leave to be painted."""
+        mask = np.asarray(segmentation.wall_mask)
+        return in_zones(mask, segmentation.cell, self.raster.zones)
+
+    def touch_up_strokes(
+        self, segmentation: WallSegmentation, film: FloatArray
+    ) -> tuple[Stroke, ...]:
+        """Returns the strokes that mend a film where it is thin.
+
+        Args:
+            segmentation: Of the tile.
+            film: m, on the tile and `margin_cells` around it.
+        """
+        site = Site.of_tile(
+            self.wanted(segmentation),
+            segmentation.cell,
+            above_wall(segmentation),
+            self._nearest(segmentation),
+        )
+        return touch_up_strokes(
+            film,
+            site,
+            nominal=self.nominal_film(segmentation),
+            tip=self.tip,
+            raster=self.raster,
+        )
+
+    def nominal_film(self, segmentation: WallSegmentation) -> float:
+        """Returns the wet film that the raster of a tile aims at, m."""
+        width = segmentation.wall_mask.shape[1] * segmentation.cell
+        return raster_film(width, tip=self.tip, raster=self.raster)
+
+    def program(
+        self, wanted: Sequence[Stroke], segmentation: WallSegmentation, q0: FloatArray
+    ) -> PaintProgram:
+        """Plans the motion that makes given strokes.
+
+        Args:
+            wanted: Strokes in T, in any order and direction; coats follow one another.
+            segmentation: Of the tile; what stands before the wall is kept clear of.
+            q0: (5,) rad, where the arm stands, at rest.
+
+        Returns:
+            The program, verified; its motion ends at the home pose.
+
+        Raises:
+            ReachError: More than a twentieth of the strokes is out of the arm's reach.
+            CollisionError: There is no clear way to any stroke, or home.
+            MotionLimitError: The finished motion fails its verification.
+        """
+        motion, limits = self.motion, self.limits
+        gun = self._gun(segmentation)
+        space = ClearSpace(
+            self.checker,
+            X_WT=segmentation.X_WT,
+            boxes=segmentation_boxes(segmentation),
+            clearance=motion.clearance,
+            floor_clearance=motion.floor_clearance,
+        )
+        linker = Linker(
+            gun=gun,
+            limits=planning_limits(limits, motion.limit_share),
+            space=space,
+            q_home=np.deg2rad(motion.home_deg),
+        )
+        clear, skipped = clear_strokes(wanted, linker, self.raster.min_stroke)
+        path, strokes, passes, unlinked = link_strokes(
+            clear, q0, linker, self.raster.flash_off
+        )
+        starts = start_times(path)[:-1]
+        flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
+        program = PaintProgram(
+            strokes=strokes,
+            motion=chain(
+                path,
+                period=motion.sample_period,
+                spray_on=np.reshape(flows, (-1, 2)) - self.tip.valve_delay,
+                flow=np.array([stroke.flow for stroke in strokes]),
+            ),
+            X_WT=segmentation.X_WT,
+            standoff=self.raster.standoff,
+            nominal_thickness=self.nominal_film(segmentation),
+            paint_volume=self.tip.flow
+            * sum(stroke.flow * stroke.length / stroke.speed for stroke in strokes),
+            skipped=(*skipped, *unlinked),
+        )
+        verify_motion(
+            program.motion,
+            kinematics=self.kinematics,
+            limits=limits,
+            limit_share=motion.limit_share,
+            space=space,
+            what="program",
+        )
+        verify_strokes(
+            program,
+            kinematics=self.kinematics,
+            valve_delay=self.tip.valve_delay,
+            surface=gun.surface,
+        )
+        return program
+
+    def _gun(self, segmentation: WallSegmentation) -> SquareGun:
+        """Returns the gun before a wall; it follows the wall's surface."""
+        surface = SurfaceFrame.of_wall(segmentation)
+        return SquareGun(self.kinematics, segmentation.X_WT, surface)
+
+    def _nearest(self, segmentation: WallSegmentation) -> FloatArray:
+        """Returns the least stand-offs on a tile, by reach and by what stands out."""
+        cell = segmentation.cell
+        border = margin_cells(cell)
+        ny, nx = (size + 2 * border for size in segmentation.wall_mask.shape)
+        x, y = cell_centres((ny, nx), cell, margin=border * cell)
+        reached = nearest_standoffs(
+            x,
+            y,
+            gun=self._gun(segmentation),
+            limits=self.limits,
+            near=self.raster.cut_in_standoff,
+            far=self.raster.standoff,
+            stopping=RUN_OUT[0][0],
+        )
+        _, *obstacles = segmentation_boxes(segmentation)  # The first is the wall.
+        clear = standoffs_beside(
+            x,
+            y,
+            obstacles=obstacles,
+            tool=tool_boxes(self.checker),
+            clearance=self.motion.clearance,
+            run_out=RUN_OUT,
+        )
+        return np.maximum(reached, clear)
+
+
+def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke, ...]:
+    """Returns what is left of strokes once those before a number are done.
+
+    Args:
+        strokes: In order of execution.
+        from_stroke: Number of the first, from 1; 12.4 begins where four tenths of the
+            twelfth are done.
+
+    Raises:
+        InputError: There is no such stroke.
+    """
+    if not 1.0 <= from_stroke < len(strokes) + 1.0:
+        raise InputError(
+            f"from_stroke must be 1 to {len(strokes)}, the number of strokes, got "
+            f"{from_stroke!r}."
+        )
+    first = int(from_stroke)
+    return (
+        strokes[first - 1].part(from_stroke - first, 1.0),
+        *strokes[first:],
+    )

@@ -1,0 +1,169 @@
+"""Gun-off motions of the cycle: home, first sight, scan, retract."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.planning import CollisionChecker
+
+from painter.errors import CollisionError
+from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.clearance.obstacles import ClearSpace, wall_box
+from painter.planning.config import (
+    MotionConfig,
+    RasterConfig,
+    ScanConfig,
+    TileConfig,
+)
+from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.joint_motion import Segment, chain, planning_limits
+from painter.planning.motion.reach import require_reach, tile_points
+from painter.planning.motion.transitions import Linker
+from painter.planning.motion.verify import verify_motion
+from painter.planning.scan.more_looks import more_looks
+from painter.planning.scan.scan_path import look_segments, scan_segments
+from painter.planning.spray_path import Motion
+from perception.fine_steps.shadows import Relief
+from perception.ground import FloatArray, FrozenValue
+
+GOALS = ("home", "look", "scan", "retract")
+
+
+@dataclass(frozen=True, eq=False)
+class TransferPlanner(FrozenValue):
+    """Plans motions with the gun closed for one robot with one set of settings.
+
+    Attributes:
+        kinematics: Of the arm.
+        limits: Of its joints.
+        checker: Of the robot's cell: arm, frame and floor.
+        tile: Size of the tile, and where the job expects it.
+        scan: Settings of first sight, scan and more looks.
+        motion: Settings of the motion.
+        standoff: Of the gun when it paints, m.
+    """
+
+    kinematics: ArmKinematics
+    limits: ArmLimits
+    checker: CollisionChecker
+    tile: TileConfig
+    scan: ScanConfig
+    motion: MotionConfig
+    standoff: float = RasterConfig.standoff
+
+    def plan(self, goal: str, q0: FloatArray, X_WT: RigidTransform) -> Motion:
+        """Plans a motion of the cycle.
+
+        Until the wall has been scanned the arm keeps `motion.wall_keepout` and the
+        clearance from it. "look" and "scan" first make sure that the whole tile can be
+        painted from where the arm stands, so that a job that cannot be done ends at
+        once.
+
+        Args:
+            goal: "home" or "retract": to the home pose; "look": over two quarters of
+                the tile; "scan": along rows over the tile.
+            q0: (5,) rad, where the arm stands, at rest.
+            X_WT: Tile frame T in W, as expected or as found.
+
+        Returns:
+            The motion, verified.
+
+        Raises:
+            ValueError: There is no such goal.
+            ReachError: The tile, or the wall, is out of the arm's reach.
+            CollisionError: There is no clear way.
+            MotionLimitError: The finished motion fails its verification.
+        """
+        if goal not in GOALS:
+            raise ValueError(f"goal must be one of {', '.join(GOALS)}, got {goal!r}.")
+        tile = self.tile
+        if goal in ("look", "scan"):
+            points = tile_points(tile.width, tile.height, self.standoff)
+            what = f"tile of {tile.width:.2f} x {tile.height:.2f} m"
+            gun = SquareGun(self.kinematics, X_WT)
+            require_reach(points, gun=gun, limits=self.limits, what=what)
+        # After painting, or once stopped half way, the gun may stand within the
+        # keepout.
+        keepouts = (0.0,) if goal == "retract" else (self.motion.wall_keepout, 0.0)
+        linker = self._linker(q0, X_WT, keepouts)
+        path: Sequence[Segment]
+        if goal == "scan":
+            path = scan_segments(q0, tile, self.scan, linker)
+        elif goal == "look":
+            path = look_segments(q0, tile, self.scan, linker)
+        else:
+            path = linker.transit(q0, linker.q_home)
+        return self._verified(path, linker.space, what=f"motion {goal!r}")
+
+    def more_looks(
+        self, q0: FloatArray, relief: Relief, X_WT: RigidTransform
+    ) -> Motion | None:
+        """Plans looks at wall that the scan has left in shadow.
+
+        The arm keeps the clearance from the highest thing that the scan has found, and
+        no less from the wall than in the scan.
+
+        Args:
+            q0: (5,) rad, where the arm stands, at rest.
+            relief: What the scan has found.
+            X_WT: Tile frame T in W, as found.
+
+        Returns:
+            The motion, verified; None if nothing is worth a look, or the arm stands
+            nearer to the wall than what was found on it is high.
+
+        Raises:
+            MotionLimitError: The finished motion fails its verification.
+            CollisionError: The same, for its clearance.
+        """
+        if not relief.hidden.any():
+            return None
+        keepout = max(self.motion.wall_keepout, float(relief.height.max()))
+        try:
+            linker = self._linker(q0, X_WT, (keepout,))
+        except CollisionError:
+            return None
+        path = more_looks(q0, relief, self.scan, linker)
+        if not path:
+            return None
+        return self._verified(path, linker.space, what="motion 'more looks'")
+
+    def _linker(
+        self, q0: FloatArray, X_WT: RigidTransform, keepouts: Sequence[float]
+    ) -> Linker:
+        """Returns a linker with the largest keepout that the arm does not stand in."""
+        motion = self.motion
+        for keepout in keepouts:
+            space = ClearSpace(
+                self.checker,
+                X_WT=X_WT,
+                boxes=[wall_box(self.tile.width, self.tile.height, keepout=keepout)],
+                clearance=motion.clearance,
+                floor_clearance=motion.floor_clearance,
+            )
+            if space.all_free(q0[None]):
+                return Linker(
+                    gun=SquareGun(self.kinematics, X_WT),
+                    limits=planning_limits(self.limits, motion.limit_share),
+                    space=space,
+                    q_home=np.deg2rad(motion.home_deg),
+                )
+        raise CollisionError(
+            f"the arm stands where it may not: {space.worst_pair(q0)}."
+        )
+
+    def _verified(
+        self, path: Sequence[Segment], space: ClearSpace, *, what: str
+    ) -> Motion:
+        """Chains the segments and looks at the outcome once more."""
+        planned = chain(path, period=self.motion.sample_period)
+        verify_motion(
+            planned,
+            kinematics=self.kinematics,
+            limits=self.limits,
+            limit_share=self.motion.limit_share,
+            space=space,
+            what=what,
+        )
+        return planned

@@ -1,0 +1,157 @@
+"""What is around an arm that simulated drives move: scene, camera and paint film."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import Demultiplexer, LogVectorOutput, PassThrough
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+
+from painter.config import Scenario
+from painter.diagrams.surroundings import AddScene, AddSurroundings
+from painter.planning.tile import nominal_tile_pose
+from painter.robot.arm_model import AddRobot
+from painter.scene.load import load_scene
+from painter.scene.sdf import wall_pose
+from painter.systems.simulated.paint_film import FilmState
+from perception.ground import FloatArray
+
+NQ = 5
+CLEARANCE_PERIOD = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class WorldPicture:
+    """A picture that the simulated camera took.
+
+    Attributes:
+        depth_mm: (H, W) uint16, mm, 0 = no return.
+        time: When, by the world's clock, s.
+    """
+
+    depth_mm: npt.NDArray[np.uint16]
+    time: float
+
+
+class SimWorld:
+    """Camera, paint film and clearances of an arm whose motion is given.
+
+    It is the simulated station without drives and plant: what that one's plant says of
+    the arm's true state is said here, sample by sample.
+    """
+
+    def __init__(self, scenario: Scenario, *, film: FilmState | None = None) -> None:
+        """Makes the world at time 0, with the arm in its home pose.
+
+        Args:
+            scenario: Robot, scene, camera and gun.
+            film: What is on the wall already; None = nothing.
+        """
+        builder = DiagramBuilder()
+        scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+        plant = MultibodyPlant(0.0)
+        plant.RegisterAsSourceForSceneGraph(scene_graph)
+        AddRobot(Parser(plant), scenario.directives)
+        scene = load_scene(scenario.scene, scenario.random_seed)
+        X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+        AddScene(plant, scene, X_WS)
+        plant.Finalize()
+        state = builder.AddNamedSystem("state", PassThrough(2 * NQ))
+        split = builder.AddNamedSystem("state_split", Demultiplexer(2 * NQ, NQ))
+        pose = builder.AddNamedSystem(
+            "geometry_pose", MultibodyPositionToGeometryPose(plant)
+        )
+        builder.Connect(state.get_output_port(), split.get_input_port())
+        builder.Connect(split.get_output_port(0), pose.get_input_port())
+        builder.Connect(
+            pose.get_output_port(),
+            scene_graph.get_source_pose_port(plant.get_source_id()),
+        )
+        builder.ExportInput(state.get_input_port(), "state")
+        AddSurroundings(
+            builder,
+            plant,
+            scene_graph,
+            scenario,
+            scene=scene,
+            X_WS=X_WS,
+            state=state.get_output_port(),
+            film=film,
+        )
+        self._world = builder.Build()
+        outer = DiagramBuilder()
+        outer.AddNamedSystem("world", self._world)
+        self._logs = {
+            name: LogVectorOutput(
+                self._world.GetOutputPort(f"cheat.{name}"), outer, CLEARANCE_PERIOD
+            )
+            for name in ("clearance", "floor_clearance")
+        }
+        for name in ("state", "gun.trigger"):
+            outer.ExportInput(self._world.GetInputPort(name), name)
+        self._plant = plant  # Geometry poses are computed with it.
+        self._root = outer.Build()
+        self._simulator = Simulator(self._root)
+        self._context = self._simulator.get_mutable_context()
+        home = np.deg2rad(scenario.motion.home_deg)
+        self._set(np.concatenate([home, np.zeros(NQ)]), 0.0)
+        self._simulator.Initialize()
+        self._picture_time = -1.0
+
+    @property
+    def time(self) -> float:
+        """Where it is, s."""
+        return float(self._context.get_time())
+
+    @property
+    def film(self) -> FilmState:
+        """What is on the wall."""
+        film: FilmState = self._evaluate("cheat.film")
+        return film
+
+    def advance(self, time: float, state: FloatArray, trigger: float) -> None:
+        """Goes on to a time at which the arm is in a state.
+
+        Args:
+            time: Later than before, s.
+            state: (10,) true q, v; rad, rad/s.
+            trigger: Of the gun, 0 to 1, as its valve is.
+        """
+        # What is due at a time is done as that time is left, with its own state.
+        self._simulator.AdvanceTo(time)
+        self._set(state, trigger)
+
+    def picture(self) -> WorldPicture | None:
+        """Returns the newest picture, once."""
+        time = float(self._evaluate("wall_camera.image_time")[0])
+        if time <= self._picture_time:
+            return None
+        self._picture_time = time
+        depth = self._evaluate("wall_camera.depth_image").data[:, :, 0].copy()
+        return WorldPicture(depth, time)
+
+    def color(self) -> npt.NDArray[np.uint8]:
+        """Returns a colour picture of now, (H, W, 3) RGB."""
+        return self._evaluate("wall_camera.color_image").data[:, :, :3].copy()
+
+    def clearances(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Returns (k,) times, s, and distances from the scene and from the floor, m."""
+        logs = {name: sink.FindLog(self._context) for name, sink in self._logs.items()}
+        return (
+            logs["clearance"].sample_times().copy(),
+            logs["clearance"].data()[0].copy(),
+            logs["floor_clearance"].data()[0].copy(),
+        )
+
+    def _set(self, state: FloatArray, trigger: float) -> None:
+        self._root.GetInputPort("state").FixValue(self._context, state)
+        self._root.GetInputPort("gun.trigger").FixValue(self._context, [trigger])
+
+    def _evaluate(self, port: str):  # type: ignore[no-untyped-def]
+        own = self._world.GetMyContextFromRoot(self._context)
+        return self._world.GetOutputPort(port).Eval(own)

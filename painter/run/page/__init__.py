@@ -1,0 +1,4 @@
+"""Pages and folders for people: the report, the catalogue of figures.
+
+The top of `run`.
+"""

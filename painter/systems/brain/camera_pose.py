@@ -1,0 +1,148 @@
+"""Pose of the depth camera when its picture was taken, from measured joints."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+
+from painter.errors import PainterError
+from painter.planning.arm.kinematics import ArmKinematics
+from perception.ground import FloatArray, FrozenValue
+
+_NQ = 5
+
+
+class ImageTimeError(PainterError):
+    """A picture's time lies outside the history of joint positions."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointHistory(FrozenValue):
+    """Joint positions over the last moments.
+
+    Attributes:
+        time: (n,) s, strictly increasing.
+        q: (n, 5) rad.
+    """
+
+    time: FloatArray
+    q: FloatArray
+
+    @classmethod
+    def empty(cls) -> "JointHistory":
+        """Makes a history of nothing."""
+        return cls(time=np.zeros(0), q=np.zeros((0, _NQ)))
+
+    def append(self, time: float, q: FloatArray, *, length: float) -> "JointHistory":
+        """Returns the history with `q` at `time`, s, back to `length` s before it.
+
+        What the history held from `time` on is replaced.
+        """
+        keep = (self.time >= time - length) & (self.time < time)
+        return JointHistory(
+            time=np.append(self.time[keep], time), q=np.vstack([self.q[keep], q])
+        )
+
+    def at(self, time: float) -> FloatArray:
+        """Returns the (5,) joint positions at `time`, s, interpolated, rad."""
+        return np.array([np.interp(time, self.time, joint) for joint in self.q.T])
+
+
+class CameraPose(LeafSystem):
+    """Looks up where the camera was when its last picture was taken.
+
+    .. pydrake_system::
+
+        name: CameraPose
+        input_ports:
+        - state
+        - image_time
+        output_ports:
+        - X_WC
+
+    Ports:
+        state: (10,): measured q, v of the arm; rad, rad/s.
+        image_time: (1,) s; negative before the first picture.
+        X_WC: RigidTransform at `image_time`; before the first picture, now.
+
+    State is one JointHistory, to which q is added every `period` s from t = 0 on. Both
+    bodies use this system: nothing but measured joints tells where the camera was.
+    """
+
+    def __init__(
+        self,
+        *,
+        kinematics: ArmKinematics,
+        period: float = 0.01,
+        length: float = 1.0,
+        X_CCm: RigidTransform | None = None,
+    ) -> None:
+        """Creates the system.
+
+        Args:
+            kinematics: Of the arm, with the camera's modelled mount.
+            period: Time between samples of q, s.
+            length: How far back samples are kept, s.
+            X_CCm: The calibrated camera frame, seen from where the model has it; None =
+                as modelled.
+
+        Raises:
+            ValueError: `period` is not positive, or `length` shorter than it.
+        """
+        super().__init__()
+        if not 0.0 < period <= length < np.inf:
+            raise ValueError(
+                "period must be > 0 s and length at least as long, "
+                f"got {period!r} and {length!r}."
+            )
+        self._kinematics = kinematics
+        self._X_CCm = RigidTransform() if X_CCm is None else X_CCm
+        self._length = length
+        # Inputs.
+        self._state_port = self.DeclareVectorInputPort("state", 2 * _NQ)
+        self._time_port = self.DeclareVectorInputPort("image_time", 1)
+        # State.
+        self._history_index = self.DeclareAbstractState(Value(JointHistory.empty()))
+        # Outputs.
+        self.DeclareAbstractOutputPort(
+            "X_WC",
+            lambda: Value(RigidTransform()),
+            self._CalcPose,
+            prerequisites_of_calc={
+                self._state_port.ticket(),
+                self._time_port.ticket(),
+                self.abstract_state_ticket(self._history_index),
+                self.time_ticket(),
+            },
+        )
+        # Events.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateHistory)
+
+    def _History(self, context: Context) -> JointHistory:
+        """Returns the history up to and with now."""
+        history = context.get_abstract_state(int(self._history_index)).get_value()
+        q = self._state_port.Eval(context)[:_NQ]
+        return history.append(context.get_time(), q, length=self._length)
+
+    def _CalcPose(self, context: Context, output: Value) -> None:
+        history = self._History(context)
+        now = context.get_time()
+        time = self._time_port.Eval(context)[0]
+        if time < 0.0:
+            time = now
+        if not history.time[0] <= time <= now:
+            name = self.GetSystemPathname()
+            raise ImageTimeError(
+                f"{name}: the picture is {now - time:.3f} s old; joint positions "
+                f"reach back {now - history.time[0]:.3f} s."
+            )
+        R_WC, p_WC = self._kinematics.camera_poses(history.at(time)[np.newaxis])
+        X_WC = RigidTransform(RotationMatrix(R_WC[0]), p_WC[0])
+        output.set_value(X_WC @ self._X_CCm)
+
+    def _UpdateHistory(self, context: Context, state: State) -> EventStatus:
+        index = int(self._history_index)
+        state.get_mutable_abstract_state(index).set_value(self._History(context))
+        return EventStatus.Succeeded()

@@ -1,0 +1,159 @@
+"""Fuses depth pictures into one map of the wall, and corrects it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.sensors import ImageDepth16U
+
+from painter.planning.config import TileConfig
+from painter.systems.ports import EvalAs
+from painter.systems.values import StageResult
+from perception.config import MapConfig
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.ground import FrozenValue
+from perception.mapping.config import PoseGraphConfig
+from perception.mapping.sessions.live_map import LiveMap
+from perception.values import SurfaceMap, Wall
+
+
+@dataclass(frozen=True, eq=False)
+class MapProgress(FrozenValue):
+    """How far the map is.
+
+    Attributes:
+        map: The map.
+        image_time: Of the last picture fused, s; -1 = none yet.
+        wall_number: Of the StageResult whose wall the map is laid on; 0 = the nominal
+            one.
+    """
+
+    map: LiveMap
+    image_time: float = -1.0
+    wall_number: int = 0
+
+
+class MapAccumulator(LeafSystem):
+    """Fuses depth pictures into one map, laid along the wall.
+
+    .. pydrake_system::
+
+        name: MapAccumulator
+        input_ports:
+        - depth_image
+        - image_time
+        - X_WC
+        - wall
+        - enabled
+        output_ports:
+        - surface_map
+
+    Ports:
+        depth_image: ImageDepth16U, mm, 0 = no return.
+        image_time: (1,) s, when that was taken; negative before the first.
+        X_WC: RigidTransform, pose of the camera at `image_time`; read only when there
+            is a new picture.
+        wall: StageResult; each new one that holds a Wall restarts the map in that
+            wall's tile frame. May be left unconnected.
+        enabled: (1,); 0 = fuse nothing. May be left unconnected: all is fused.
+        surface_map: SurfaceMap in W of all that was fused since the last restart, at
+            the poses that the pose graph makes of the arm's; see `LiveMap`. Costs up to
+            some seconds to evaluate, once after each picture.
+
+    State is one MapProgress, updated every `period` s, first at t = 0. Each picture is
+    fused once; one taken while `enabled` was 0 is not fused later unless it is still
+    the last one.
+    """
+
+    def __init__(
+        self,
+        *,
+        config: MapConfig,
+        pose_graph: PoseGraphConfig,
+        intrinsics: CameraIntrinsics,
+        tile: TileConfig,
+        X_WT: RigidTransform,
+        period: float,
+    ) -> None:
+        """Creates the system.
+
+        Args:
+            config: Of the map.
+            pose_graph: Of what corrects the arm's poses.
+            intrinsics: Of the depth camera.
+            tile: Its size is used.
+            X_WT: Where the tile is expected, until `wall` says better.
+            period: Time between looks for a new picture, s.
+
+        Raises:
+            ValueError: A setting is out of bounds or `period` not a positive number.
+        """
+        super().__init__()
+        if not (np.isfinite(period) and period > 0.0):
+            raise ValueError(f"period must be > 0 s, got {period!r}.")
+        # Inputs.
+        self._depth_port = self.DeclareAbstractInputPort(
+            "depth_image", Value(ImageDepth16U(intrinsics.width, intrinsics.height))
+        )
+        self._time_port = self.DeclareVectorInputPort("image_time", 1)
+        self._pose_port = self.DeclareAbstractInputPort("X_WC", Value(RigidTransform()))
+        self._wall_port = self.DeclareAbstractInputPort("wall", Value(StageResult()))
+        self._enabled_port = self.DeclareVectorInputPort("enabled", 1)
+        # State.
+        empty = LiveMap.empty(
+            X_WT, (tile.width, tile.height), config, intrinsics, pose_graph
+        )
+        self._progress_index = self.DeclareAbstractState(Value(MapProgress(empty)))
+        # Outputs.
+        self.DeclareAbstractOutputPort(
+            "surface_map",
+            lambda: Value(SurfaceMap.empty()),
+            self._CalcSurfaceMap,
+            prerequisites_of_calc={self.abstract_state_ticket(self._progress_index)},
+        )
+        # Events.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateMap)
+
+    def _Progress(self, context: Context) -> MapProgress:
+        return context.get_abstract_state(int(self._progress_index)).get_value()
+
+    def _CalcSurfaceMap(self, context: Context, output: Value) -> None:
+        # The map keeps its surface: Drake's cache is emptied by every event, changed
+        # or not.
+        output.set_value(self._Progress(context).map.surface_map)
+
+    def _UpdateMap(self, context: Context, state: State) -> EventStatus:
+        before = self._Progress(context)
+        progress = self._Fuse(context, self._Restart(context, before))
+        if progress is before:
+            return EventStatus.DidNothing()
+        index = int(self._progress_index)
+        state.get_mutable_abstract_state(index).set_value(progress)
+        return EventStatus.Succeeded()
+
+    def _Restart(self, context: Context, progress: MapProgress) -> MapProgress:
+        """Returns an empty map in the tile frame of a wall newly found, if any."""
+        if not self._wall_port.HasValue(context):
+            return progress
+        result = EvalAs(self._wall_port, context, StageResult)
+        if result.number == progress.wall_number or not isinstance(result.value, Wall):
+            return progress
+        empty = progress.map.restarted(result.value.X_WT)
+        return progress.replace(map=empty, wall_number=result.number)
+
+    def _Fuse(self, context: Context, progress: MapProgress) -> MapProgress:
+        """Returns the map with the last picture in it, if that is a new one."""
+        if self._enabled_port.HasValue(context) and (
+            self._enabled_port.Eval(context)[0] == 0.0
+        ):
+            return progress
+        image_time = float(self._time_port.Eval(context)[0])
+        if image_time < 0.0 or image_time == progress.image_time:
+            return progress
+        depth_mm = EvalAs(self._depth_port, context, ImageDepth16U).data[:, :, 0]
+        # A copy: what the port gives out is overwritten with the next pose.
+        X_WC = RigidTransform(EvalAs(self._pose_port, context, RigidTransform))
+        fused = progress.map.fused(image_time, depth_mm, X_WC)
+        return progress.replace(map=fused, image_time=image_time)

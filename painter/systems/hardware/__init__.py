@@ -1,0 +1,4 @@
+"""Systems of the robot's body: CANopen drives and gun, the RealSense camera.
+
+The only systems that import a bus or a camera.
+"""

@@ -1,0 +1,186 @@
+"""The robot's arm and gun on the station's ports; hardware only."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    EventStatus,
+    LeafSystem,
+    State,
+)
+
+from painter.canopen.master.feedback import Feedback, Phase
+from painter.canopen.master.setpoints import Setpoint
+from painter.canopen.process.robot_clock import Bus, RobotClock
+from painter.errors import BusError
+from painter.systems.ports import EvalAs
+from painter.systems.values import ArmStatus, CameraStatus, DriveStatus
+from perception.ground import FloatArray, FrozenValue
+
+NQ = 5
+# How far back samples are read: what the diagram may be behind, and a few cycles.
+_HISTORY = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class ArmReading(FrozenValue):
+    """What was last read of the bus.
+
+    Attributes:
+        state: (10,) q, v as measured at the diagram's time; rad, rad/s.
+        status: Of the drives, as they are now.
+    """
+
+    state: FloatArray
+    status: ArmStatus
+
+
+class CanopenArm(LeafSystem):
+    """Sends setpoints to the bus and reads what it measures.
+
+    .. pydrake_system::
+
+        name: CanopenArm
+        input_ports:
+        - desired_state
+        - trigger
+        - camera_status
+        output_ports:
+        - state_estimated
+        - status
+
+    Ports:
+        desired_state: (10,) q, v; rad, rad/s.
+        trigger: (1,) 0 to 1 of the nominal flow.
+        camera_status: CameraStatus; a camera that is gone stops the arm. May be left
+            unconnected.
+        state_estimated: (10,) measured q, v at the diagram's time; rad, rad/s.
+        status: ArmStatus; why the bus has stopped comes before all else.
+
+    State is one ArmReading, replaced every `period` s. Setpoints are sent at the same
+    times, stamped with when they are to be carried out; nothing here waits for the bus.
+    """
+
+    def __init__(
+        self,
+        *,
+        bus: Bus,
+        clock: RobotClock,
+        period: float = 0.005,
+        gun_off: bool = False,
+    ) -> None:
+        """Creates the system.
+
+        Args:
+            bus: With its drives enabled.
+            clock: The diagram's time on the bus.
+            period: Time between setpoints, s; the bus's cycle.
+            gun_off: Whether the gun stays closed, whatever `trigger` says.
+
+        Raises:
+            BusError: The bus has ended, or its drives are not enabled.
+        """
+        super().__init__()
+        report = bus.report()
+        if report is None or report.feedback.phase != Phase.ENABLED:
+            raise BusError("the drives are not enabled.")
+        self._bus = bus
+        self._clock = clock
+        self._gun_off = gun_off
+        feedback = report.feedback
+        first = ArmReading(
+            np.concatenate([feedback.q, np.zeros(NQ)]), arm_status(feedback)
+        )
+        # Inputs.
+        self._desired_port = self.DeclareVectorInputPort("desired_state", 2 * NQ)
+        self._trigger_port = self.DeclareVectorInputPort("trigger", 1)
+        self._camera_port = self.DeclareAbstractInputPort(
+            "camera_status", Value(CameraStatus())
+        )
+        # State.
+        self._reading_index = self.DeclareAbstractState(Value(first))
+        # Outputs.
+        ticket = {self.abstract_state_ticket(self._reading_index)}
+        self.DeclareVectorOutputPort(
+            "state_estimated", 2 * NQ, self._CalcState, prerequisites_of_calc=ticket
+        )
+        self.DeclareAbstractOutputPort(
+            "status",
+            lambda: Value(ArmStatus()),
+            self._CalcStatus,
+            prerequisites_of_calc=ticket,
+        )
+        # Events.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateFromBus)
+        self.DeclarePeriodicPublishEvent(period, 0.0, self._PublishSetpoint)
+
+    def _Reading(self, context: Context) -> ArmReading:
+        return context.get_abstract_state(int(self._reading_index)).get_value()
+
+    def _CalcState(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._Reading(context).state)
+
+    def _CalcStatus(self, context: Context, output: Value) -> None:
+        output.set_value(self._Reading(context).status)
+
+    def _UpdateFromBus(self, context: Context, state: State) -> EventStatus:
+        last = self._Reading(context)
+        try:
+            report = self._bus.report()
+        except BusError as error:
+            after = last.replace(status=last.status.replace(stopped=str(error)))
+        else:
+            when = self._clock.bus_time(context.get_time())
+            samples = self._bus.samples(when - _HISTORY)
+            after = last
+            if samples.time.size:
+                after = after.replace(state=np.concatenate(samples.at(when)))
+            if report is not None:
+                after = after.replace(status=arm_status(report.feedback))
+        index = int(self._reading_index)
+        state.get_mutable_abstract_state(index).set_value(after)
+        return EventStatus.Succeeded()
+
+    def _PublishSetpoint(self, context: Context) -> EventStatus:
+        if self._Reading(context).status.stopped:
+            return EventStatus.DidNothing()
+        desired = self._desired_port.Eval(context)
+        trigger = float(self._trigger_port.Eval(context)[0])
+        point = Setpoint(
+            time=self._clock.execution(context.get_time()),
+            q=np.array(desired[:NQ]),
+            v=np.array(desired[NQ:]),
+            trigger=0.0 if self._gun_off else trigger,
+        )
+        try:
+            if self._camera_port.HasValue(context):
+                fault = EvalAs(self._camera_port, context, CameraStatus).fault
+                if fault is not None:
+                    self._bus.stop(fault)
+                    return EventStatus.Succeeded()
+            self._bus.push([point])
+        except BusError:
+            # The next update finds out why, and the brain ends the cycle.
+            return EventStatus.DidNothing()
+        return EventStatus.Succeeded()
+
+
+def arm_status(feedback: Feedback) -> ArmStatus:
+    """Returns the bus's feedback as the brain sees it."""
+    stopped = feedback.reason
+    if not stopped and feedback.phase != Phase.ENABLED:
+        stopped = f"the bus is {feedback.phase}."
+    return ArmStatus(
+        drives=tuple(
+            DriveStatus(
+                state=axis.state,
+                fault_code=axis.code,
+                following_error=axis.following_error,
+            )
+            for axis in feedback.axes
+        ),
+        stopped=stopped,
+    )

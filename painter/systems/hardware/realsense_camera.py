@@ -1,0 +1,173 @@
+"""The robot's depth camera on the station's ports."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    EventStatus,
+    LeafSystem,
+    State,
+)
+from pydrake.systems.sensors import ImageDepth16U, ImageRgba8U
+
+from painter.camera.frames import CameraFrame
+from painter.camera.reader import CameraHealth, Reading
+from painter.systems.values import CameraStatus
+from perception.ground import FrozenValue
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPicture(FrozenValue):
+    """The last picture and how the camera fares.
+
+    Attributes:
+        frame: As the driver gave it; None before the first.
+        time: When it was taken, by the diagram's clock, s; -1 = none yet.
+        health: Of the camera.
+    """
+
+    frame: CameraFrame | None = None
+    time: float = -1.0
+    health: CameraHealth = field(default_factory=CameraHealth)
+
+
+class RealsenseCamera(LeafSystem):
+    """Depth camera of the robot; hardware only.
+
+    .. pydrake_system::
+
+        name: RealsenseCamera
+        input_ports: []
+        output_ports:
+        - depth_image
+        - color_image
+        - image_time
+        - status
+
+    Ports:
+        depth_image: ImageDepth16U, mm, 0 = no return; the last picture, all 0 before
+            the first.
+        color_image: ImageRgba8U, the last one, black where there is none.
+        image_time: (1,) s, when the depth picture was taken, by the diagram's clock; -1
+            before the first.
+        status: CameraStatus; names what is wrong with the camera.
+
+    State is one CameraPicture, replaced every `period` s, first at t = 0, with the
+    newest that the reading thread has. A picture's age now, by this computer's clock,
+    gives its time by the diagram's: both run at the same rate.
+    """
+
+    def __init__(
+        self,
+        *,
+        read: Callable[[], Reading],
+        width: int,
+        height: int,
+        color_width: int,
+        color_height: int,
+        period: float,
+        diagram_time: Callable[[float], float] | None = None,
+    ) -> None:
+        """Creates the system.
+
+        Args:
+            read: Returns the newest of the camera without waiting; `CameraReader.read`.
+            width: Of depth pictures, px.
+            height: Of depth pictures, px.
+            color_width: Of colour pictures on the port, px; others are not shown.
+            color_height: Of colour pictures on the port, px.
+            period: Time between looks for a new picture, s.
+            diagram_time: Maps this computer's clock, s, to the diagram's, s; None takes
+                the diagram to be at now.
+
+        Raises:
+            ValueError: `period` is not a positive number.
+        """
+        super().__init__()
+        if not (np.isfinite(period) and period > 0.0):
+            raise ValueError(f"period must be > 0 s, got {period!r}.")
+        self._read = read
+        self._diagram_time = diagram_time
+        self._color_shape = (color_height, color_width, 3)
+        # State.
+        self._picture_index = self.DeclareAbstractState(Value(CameraPicture()))
+        # Outputs.
+        ticket = {self.abstract_state_ticket(self._picture_index)}
+        self.DeclareAbstractOutputPort(
+            "depth_image",
+            lambda: Value(ImageDepth16U(width, height)),
+            self._CalcDepthImage,
+            prerequisites_of_calc=ticket,
+        )
+        self.DeclareAbstractOutputPort(
+            "color_image",
+            lambda: Value(ImageRgba8U(color_width, color_height)),
+            self._CalcColorImage,
+            prerequisites_of_calc=ticket,
+        )
+        self.DeclareVectorOutputPort(
+            "image_time", 1, self._CalcImageTime, prerequisites_of_calc=ticket
+        )
+        self.DeclareAbstractOutputPort(
+            "status",
+            lambda: Value(CameraStatus()),
+            self._CalcStatus,
+            prerequisites_of_calc=ticket,
+        )
+        # Events.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdatePicture)
+
+    def _Picture(self, context: Context) -> CameraPicture:
+        return context.get_abstract_state(int(self._picture_index)).get_value()
+
+    def _CalcDepthImage(self, context: Context, output: Value) -> None:
+        frame = self._Picture(context).frame
+        data = output.get_mutable_value().mutable_data
+        data[:, :, 0] = 0 if frame is None else frame.depth_mm
+
+    def _CalcColorImage(self, context: Context, output: Value) -> None:
+        frame = self._Picture(context).frame
+        data = output.get_mutable_value().mutable_data
+        data[:, :, 3] = 255
+        color = None if frame is None else frame.color
+        is_shown = color is not None and color.shape == self._color_shape
+        data[:, :, :3] = color if is_shown else 0
+
+    def _CalcImageTime(self, context: Context, output: BasicVector) -> None:
+        output.SetAtIndex(0, self._Picture(context).time)
+
+    def _CalcStatus(self, context: Context, output: Value) -> None:
+        health = self._Picture(context).health
+        output.set_value(
+            CameraStatus(
+                state=health.state.value,
+                problem=health.problem,
+                pictures=health.pictures,
+                dropped=health.repeated + health.late,
+            )
+        )
+
+    def _UpdatePicture(self, context: Context, state: State) -> EventStatus:
+        last = self._Picture(context)
+        reading = self._read()
+        if reading.frame is last.frame and reading.health == last.health:
+            return EventStatus.DidNothing()
+        picture = last.replace(health=reading.health)
+        if reading.frame is not None and reading.frame is not last.frame:
+            now = context.get_time()
+            if self._diagram_time is None:
+                taken = now - (time.monotonic() - reading.taken)
+            else:
+                taken = self._diagram_time(reading.taken)
+            # Taken before the diagram's time began: not a picture of this run; or after
+            # where the diagram is: it will be in time at the next look.
+            if 0.0 <= taken <= now and taken > last.time:
+                picture = picture.replace(frame=reading.frame, time=taken)
+        index = int(self._picture_index)
+        state.get_mutable_abstract_state(index).set_value(picture)
+        return EventStatus.Succeeded()

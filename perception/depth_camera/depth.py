@@ -1,0 +1,117 @@
+"""Depth images: pinhole intrinsics, the pixels that can be used, and their points."""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from perception.config import MapConfig, StereoConfig
+from perception.depth_camera.windows import moving_max, moving_min
+from perception.ground import BoolArray, FloatArray
+
+
+@dataclass(frozen=True)
+class CameraIntrinsics:
+    """Pinhole camera; pixel (0, 0) is the centre of the upper left one.
+
+    Attributes:
+        fx: Focal length along the rows, px.
+        fy: Focal length along the columns, px.
+        cx: Column of the principal point, px.
+        cy: Row of the principal point, px.
+        width: Width of the picture, px.
+        height: Height of the picture, px.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @classmethod
+    def from_stereo(cls, config: StereoConfig) -> Self:
+        """Makes the intrinsics of a stereo camera without distortion.
+
+        Source: Intel, "Subpixel linearity improvement for RealSense depth cameras":
+        f = (W / 2) / tan(HFOV / 2), the axis through the middle of the picture.
+        """
+        focal = config.width / 2 / math.tan(math.radians(config.hfov_deg) / 2)
+        return cls(
+            fx=focal,
+            fy=focal,
+            cx=config.width / 2 - 0.5,
+            cy=config.height / 2 - 0.5,
+            width=config.width,
+            height=config.height,
+        )
+
+
+def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolArray:
+    """Finds the pixels whose depth can be trusted.
+
+    A block matcher makes the near side of a depth edge grow by half its window, and
+    puts flying pixels between the two sides. So near pixels within half of
+    `config.edge_window` of farther ones are dropped, and far pixels next to a nearer
+    one. A farther one that stands alone is a flying pixel itself, and no edge. Pixels
+    without depth count as what lies to their left: the shadow that hides them from the
+    right imager begins at the far side, which is on the left.
+
+    Args:
+        depth_mm: (H, W) uint16, mm, 0 = no return.
+        config: `min_range`, `max_range`, `edge_jump`, `edge_step` and `edge_window` are
+            used.
+
+    Returns:
+        (H, W) bool.
+    """
+    seen = depth_mm > 0
+    column = np.where(seen, np.arange(depth_mm.shape[1], dtype=np.int32), 0)
+    column = np.maximum.accumulate(column, axis=1)
+    depth = np.take_along_axis(depth_mm, column, axis=1).astype(np.float32)
+    # `edge_step` is in 1/m, depth in mm.
+    step = np.float32(config.edge_step / 1000)
+    jump = np.minimum(np.float32(config.edge_jump) * depth, step * depth**2)
+    # What is left of far areas has lost a pixel along its edges, and gets it back.
+    far = moving_max(moving_min(depth, 3), config.edge_window + 2)
+    usable: BoolArray = seen & (far - depth <= jump)
+    usable &= depth - moving_min(depth, 3) <= jump
+    usable &= (depth >= 1000 * config.min_range) & (depth <= 1000 * config.max_range)
+    return usable
+
+
+def backproject(
+    depth_mm: npt.NDArray[np.uint16],
+    usable: BoolArray,
+    intrinsics: CameraIntrinsics,
+    stride: int = 1,
+) -> FloatArray:
+    """Turns pixels into points.
+
+    Args:
+        depth_mm: (H, W) uint16, mm, along C's z.
+        usable: (H, W) bool, which pixels to take.
+        intrinsics: Of the camera.
+        stride: Every so many-th pixel and row is taken.
+
+    Returns:
+        (3, N) float64, m, in C (x right, y down, z ahead), row by row.
+
+    Raises:
+        ValueError: The picture is not of the camera's size.
+    """
+    expected = (intrinsics.height, intrinsics.width)
+    if depth_mm.shape != expected or usable.shape != expected:
+        raise ValueError(
+            f"depth_mm and usable must be {expected} (H, W), "
+            f"got {depth_mm.shape} and {usable.shape}."
+        )
+    row, column = np.nonzero(usable[::stride, ::stride])
+    row, column = stride * row, stride * column
+    z = depth_mm[row, column] / 1000.0
+    x = (column - intrinsics.cx) / intrinsics.fx * z
+    y = (row - intrinsics.cy) / intrinsics.fy * z
+    return np.stack([x, y, z])

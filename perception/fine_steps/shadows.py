@@ -1,0 +1,68 @@
+"""Wall that a scan has left in shadow, on the tile's grid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from perception.fine_steps.unseen import close_gaps, in_shadow
+from perception.ground import BoolArray, FloatArray, FrozenValue
+
+_RAISED = 0.02
+"""What stands so far before the wall hides more than the width of a cell, m."""
+_LEVEL = 0.04
+"""The wall's own points lie so near to the plane that it was found on, m."""
+_SLIVER = 2.0
+"""Shadows no wider than so many cells are no worse than an edge's own error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Relief(FrozenValue):
+    """What is known of the tile after a scan.
+
+    Attributes:
+        height: (ny, nx) m, of what is raised; 0 elsewhere.
+        hidden: (ny, nx) cells in shadows wider than an edge's own error.
+        cell: Edge of a cell, m.
+    """
+
+    height: FloatArray
+    hidden: BoolArray
+    cell: float
+
+
+def find_relief(
+    p_TQs: FloatArray,
+    p_TCs: FloatArray,
+    *,
+    width: float,
+    height: float,
+    cell: float,
+) -> Relief:
+    """Lays a map on the tile's grid and finds the wall in shadow.
+
+    Args:
+        p_TQs: (3, N) m, in T: surface points, denser than the grid.
+        p_TCs: (3, k) m, in T, where the pictures were taken.
+        width: Of the tile, m.
+        height: Of the tile, m.
+        cell: Edge of a cell, m.
+    """
+    nx, ny = (round(length / cell) for length in (width, height))
+    columns, rows = np.floor(p_TQs[:2] / cell).astype(np.int64)
+    inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
+    top = np.full((ny, nx), -np.inf)
+    np.maximum.at(top, (rows[inside], columns[inside]), p_TQs[2, inside])
+    seen = np.isfinite(top)
+    level = seen & (np.abs(top) < _LEVEL)
+    residual = top - (float(np.median(top[level])) if level.any() else 0.0)
+    raised = seen & (residual > _RAISED)
+    hole = ~seen & ~close_gaps(seen, spacing=0.0, cell=cell)
+    residual[~seen] = np.nan
+    shadow = in_shadow(hole, raised, residual, cell=cell, p_TCs=p_TCs)
+    lit = distance_transform_edt(~(seen & ~raised))
+    return Relief(
+        height=np.where(raised, residual, 0.0),
+        hidden=shadow & (lit > _SLIVER),
+        cell=cell,
+    )

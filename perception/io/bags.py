@@ -1,0 +1,154 @@
+"""Depth from recordings of RealSense cameras, through librealsense.
+
+The driver is native code that a damaged file may crash or hang, so it runs in a process
+of its own:
+
+    python -m perception.io.bags RECORDING FRAMES.npz
+"""
+
+import importlib.util
+import itertools
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from perception.errors import CloudReadError
+from perception.ground import FloatArray
+from perception.io.clouds import check_file, checked_points
+from perception.io.depth_images import MAX_FRAMES, DepthCamera, median_depth
+
+# librealsense records ROS 1 bags, from 2.58 on ROS 2 ones; it plays both.
+BAG_SUFFIXES = (".bag", ".db3")
+_TIMEOUT = 25.0  # s
+_FRAME_WAIT_MS = 2000
+
+
+def read_bag(path: Path) -> FloatArray:
+    """Reads the depth of a RealSense recording of a scene at rest.
+
+    Args:
+        path: A `.bag` or `.db3` file with a depth stream; its first `MAX_FRAMES`
+            pictures are fused by `median_depth`.
+
+    Returns:
+        p_CQs (3, N) m, in C (x right, y down, z ahead).
+
+    Raises:
+        CloudReadError: The file is missing or unusable, or pyrealsense2 is not
+            installed; names the reason.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        frames = Path(folder) / "frames.npz"
+        play_apart("perception.io.bags", path, frames, timeout=_TIMEOUT)
+        with np.load(frames) as content:
+            depth, numbers = content["depth"], content["camera"]
+    height, width = depth.shape
+    fx, fy, cx, cy, scale = map(float, numbers)
+    camera = DepthCamera(width, height, fx, fy, cx, cy, scale)
+    return checked_points(path, camera.points(depth))
+
+
+def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
+    """Plays a recording in a process of its own.
+
+    Args:
+        module: Run as a program with the paths of recording and result; what it cannot
+            read it says in its last line.
+        path: A `.bag` or `.db3` file.
+        out: Where the result goes.
+        timeout: The process is given up after this time, s.
+
+    Raises:
+        CloudReadError: The file is missing or unusable, or pyrealsense2 is not
+            installed; names the reason.
+    """
+    check_file(path)
+    if importlib.util.find_spec("pyrealsense2") is None:
+        raise CloudReadError(
+            f"{path}: reading RealSense recordings needs pyrealsense2; "
+            "install it with: pip install 'painter[hardware]'."
+        )
+    words = [sys.executable, "-m", module, str(path), str(out)]
+    try:
+        done = subprocess.run(words, capture_output=True, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise CloudReadError(
+            f"{path}: librealsense took over {timeout:g} s."
+        ) from error
+    if done.returncode != 0 or not out.exists():
+        reason = done.stderr.decode(errors="replace").strip().splitlines()
+        raise CloudReadError(
+            f"{path}: librealsense cannot read it: "
+            f"{reason[-1] if reason else f'it ended with {done.returncode}'}."
+        )
+
+
+def depth_groups(path: str, *streams: Any) -> Iterator[tuple[Any, Any]]:
+    """Plays a recording's pictures, as fast as they are taken.
+
+    Args:
+        path: Of the recording.
+        *streams: Of librealsense, to be played alone; all if left out.
+
+    Yields:
+        Each depth frame, and the set of frames that it came in.
+
+    Raises:
+        ValueError: There is no depth picture.
+    """
+    import pyrealsense2 as rs
+
+    config, pipeline = rs.config(), rs.pipeline()
+    rs.config.enable_device_from_file(config, path, repeat_playback=False)
+    for stream in streams:
+        config.enable_stream(stream)
+    profile = pipeline.start(config)
+    profile.get_device().as_playback().set_real_time(False)
+    empty = True
+    while True:
+        there, group = pipeline.try_wait_for_frames(_FRAME_WAIT_MS)
+        frame = group.get_depth_frame() if there else None
+        if not frame:
+            break
+        empty = False
+        yield frame, group
+    if empty:
+        raise ValueError("it has no depth pictures")
+
+
+def rectified_lens(frame: Any) -> Any:
+    """Returns the intrinsics of a depth frame; a ValueError says it is distorted."""
+    lens = frame.profile.as_video_stream_profile().intrinsics
+    if any(lens.coeffs):
+        raise ValueError(f"its depth is distorted ({lens.model}), not rectified")
+    return lens
+
+
+def _play(path: str) -> tuple[Any, Any]:
+    """Plays a recording; returns the depth in units and the camera's numbers."""
+    import pyrealsense2 as rs
+
+    frames: list[Any] = []
+    for frame, _ in itertools.islice(depth_groups(path, rs.stream.depth), MAX_FRAMES):
+        scale = frame.get_units()
+        lens = rectified_lens(frame)
+        frames.append(np.array(frame.get_data()))
+    numbers = [lens.fx, lens.fy, lens.ppx, lens.ppy, scale]
+    return median_depth(frames), numbers
+
+
+def _main() -> None:
+    try:
+        depth, camera = _play(sys.argv[1])
+    except (RuntimeError, ValueError) as error:
+        raise SystemExit(" ".join(str(error).split())) from None
+    np.savez(sys.argv[2], depth=depth, camera=np.array(camera))
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,168 @@
+"""Segmentations in files, as DESIGN.md section 5 lays them down."""
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+from pydrake.math import RigidTransform
+
+from perception.errors import CloudReadError
+from perception.ground import BoolArray, FloatArray
+from perception.values import Opening, WallSegmentation
+
+_FIELDS = ("labels", "depth", "wall_mask", "X_WT", "cell")
+_EXTRAS = ("surface", "normals", "confidence", "reason")  # Where they were made.
+_OPENINGS = tuple(
+    f"opening_{name}"
+    for name in ("kind", "area", "depth", "glass_share", "corners", "p_TVs")
+)
+
+
+def save_segmentation(path: Path, segmentation: WallSegmentation) -> None:
+    """Writes a segmentation.
+
+    Args:
+        path: File to write, `segmentation.npz`: `labels` (ny, nx) uint16, `depth`
+            (ny, nx) float32 m, `wall_mask` (ny, nx) bool, `X_WT` (4, 4), `cell` m; row
+            0 at the bottom; and, where fine steps drew the mask, `surface` (ny, nx)
+            float32 m, `normals` (ny, nx, 3) float32, `confidence` (ny, nx) float32 and
+            `reason` (ny, nx) uint8. Of openings, the largest first: `opening_kind`
+            (k,) str, `opening_area` (k,) m², `opening_depth` (k,) m,
+            `opening_glass_share` (k,), and their corners, one after another,
+            `opening_p_TVs` (2, n) m in T, `opening_corners` (k,) of each.
+        segmentation: What to write.
+    """
+    extras: dict[str, Any] = {
+        name: getattr(segmentation, name)
+        for name in _EXTRAS
+        if getattr(segmentation, name) is not None
+    }
+    extras |= _opening_arrays(segmentation.openings)
+    np.savez_compressed(
+        path,
+        labels=segmentation.labels,
+        depth=segmentation.depth,
+        wall_mask=segmentation.wall_mask,
+        X_WT=segmentation.X_WT.GetAsMatrix4(),
+        cell=np.float64(segmentation.cell),
+        **extras,
+    )
+
+
+def load_segmentation(path: Path) -> WallSegmentation:
+    """Reads a segmentation.
+
+    Args:
+        path: File that `save_segmentation` wrote.
+
+    Returns:
+        The segmentation.
+
+    Raises:
+        CloudReadError: The file is missing, damaged or not a segmentation; names the
+            file and the field.
+    """
+    if not path.is_file():
+        raise CloudReadError(f"{path}: no such file.")
+    try:
+        file = np.load(path, allow_pickle=False)
+        # A lone array, from a .npy file, has no names.
+        missing = [name for name in _FIELDS if name not in getattr(file, "files", ())]
+        if missing:
+            raise CloudReadError(f"{path}: no segmentation: {missing[0]} is missing.")
+        content = {name: file[name] for name in _FIELDS}
+        extras = {name: file[name] for name in _EXTRAS if name in file.files}
+        openings = _openings({name: file[name] for name in _OPENINGS if name in file})
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise CloudReadError(f"{path}: no segmentation: {error}") from error
+    labels = content["labels"]
+    for name in ("labels", "depth", "wall_mask"):
+        if content[name].ndim != 2 or content[name].shape != labels.shape:
+            raise CloudReadError(
+                f"{path}: {name} has shape {content[name].shape}, "
+                f"labels {labels.shape}; both must be (ny, nx)."
+            )
+    for name, grid in extras.items():
+        if grid.shape[:2] != labels.shape:
+            raise CloudReadError(
+                f"{path}: {name} has shape {grid.shape}, labels {labels.shape}."
+            )
+    matrix = content["X_WT"]
+    if matrix.shape != (4, 4) or not _is_rotation(matrix[:3, :3]):
+        raise CloudReadError(f"{path}: X_WT is no pose.")
+    cell = float(content["cell"])
+    if not (np.isfinite(cell) and cell > 0.0):
+        raise CloudReadError(f"{path}: cell must be > 0 m, got {cell!r}.")
+    return WallSegmentation(
+        labels=labels.astype(np.uint16),
+        depth=content["depth"].astype(np.float32),
+        wall_mask=content["wall_mask"].astype(np.bool_),
+        X_WT=RigidTransform(matrix),
+        cell=cell,
+        openings=openings,
+        **extras,
+    )
+
+
+def save_wall_mask(path: Path, wall_mask: BoolArray) -> None:
+    """Writes a mask as a picture: white = paint, as seen from the robot.
+
+    Args:
+        path: PNG file to write; row 0 of the picture is the top.
+        wall_mask: (ny, nx), row 0 at the bottom.
+    """
+    Image.fromarray(np.flipud(wall_mask).astype(np.uint8) * 255, mode="L").save(path)
+
+
+def _opening_arrays(openings: tuple[Opening, ...]) -> dict[str, npt.NDArray[Any]]:
+    """Returns openings as arrays by name; none where there are none."""
+    if not openings:
+        return {}
+    columns = [
+        np.array([opening.kind for opening in openings]),
+        np.array([opening.area for opening in openings]),
+        np.array([opening.depth for opening in openings]),
+        np.array([opening.glass_share for opening in openings]),
+        np.array([opening.p_TVs.shape[1] for opening in openings]),
+        np.concatenate([opening.p_TVs for opening in openings], axis=1),
+    ]
+    return dict(zip(_OPENINGS, columns, strict=True))
+
+
+def _openings(arrays: dict[str, npt.NDArray[Any]]) -> tuple[Opening, ...]:
+    """Returns the openings of arrays.
+
+    Raises:
+        ValueError: The arrays do not belong together.
+    """
+    if not arrays:
+        return ()
+    missing = [name for name in _OPENINGS if name not in arrays]
+    if missing:
+        raise ValueError(f"{missing[0]} is missing.")
+    *columns, corners, p_TVs = (arrays[name] for name in _OPENINGS)
+    lengths = {column.shape for column in (*columns, corners)}
+    if len(lengths) != 1 or p_TVs.shape != (2, int(corners.sum())):
+        raise ValueError(f"the openings have {lengths} figures, {p_TVs.shape} corners.")
+    outlines = np.split(p_TVs, np.cumsum(corners)[:-1], axis=1)
+    return tuple(
+        Opening(
+            kind=str(kind),
+            p_TVs=outline,
+            area=float(area),
+            depth=float(depth),
+            glass_share=float(glass_share),
+        )
+        for kind, area, depth, glass_share, outline in zip(
+            *columns, outlines, strict=True
+        )
+    )
+
+
+def _is_rotation(matrix: FloatArray) -> bool:
+    square = np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
+    return square and float(np.linalg.det(matrix)) > 0.0

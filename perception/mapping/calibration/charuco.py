@@ -1,0 +1,169 @@
+"""Hand-eye calibration by a ChArUco board that stands still before the camera."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydrake.math import RigidTransform, RotationMatrix
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.ground import FloatArray, IntArray
+from perception.io.frames import ColorImage, Frame
+from perception.mapping.calibration.hand_eye import FEWEST, CalibrationError, HandEye
+
+_DICTIONARY = cv2.aruco.DICT_5X5_100
+_FEWEST_CORNERS = 6
+_HUBER = 2.0
+"""Corners farther off than this count less, px."""
+
+
+@dataclass(frozen=True)
+class BoardConfig:
+    """A ChArUco board with markers of OpenCV's DICT_5X5_100.
+
+    Attributes:
+        columns: Squares across.
+        rows: Squares down.
+        square: Edge of a square, m.
+        marker: Edge of a marker, m.
+    """
+
+    columns: int = 8
+    rows: int = 6
+    square: float = 0.04
+    marker: float = 0.03
+
+    def validate(self) -> None:
+        """Raises ValueError for a value out of bounds."""
+        for name in ("columns", "rows"):
+            if getattr(self, name) < 3:
+                raise ValueError(
+                    f"board.{name} must be >= 3, got {getattr(self, name)}."
+                )
+        if not 0.0 < self.marker < self.square < np.inf:
+            raise ValueError(
+                "board.marker must be > 0 and below board.square, "
+                f"got {self.marker!r} and {self.square!r}."
+            )
+
+    def board(self) -> cv2.aruco.CharucoBoard:
+        """Returns OpenCV's board."""
+        dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
+        size = (self.columns, self.rows)
+        return cv2.aruco.CharucoBoard(size, self.square, self.marker, dictionary)
+
+    def draw(self, pixels_per_m: float) -> npt.NDArray[np.uint8]:
+        """Draws the board without a margin, grey levels, to be printed."""
+        width = round(self.columns * self.square * pixels_per_m)
+        height = round(self.rows * self.square * pixels_per_m)
+        return np.asarray(self.board().generateImage((width, height))).astype(np.uint8)
+
+
+def find_corners(color: ColorImage, config: BoardConfig) -> tuple[IntArray, FloatArray]:
+    """Finds the board's corners in a picture.
+
+    Returns:
+        Numbers of the corners (n,) and where they are (n, 2), px.
+    """
+    grey = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
+    corners, numbers, _, _ = cv2.aruco.CharucoDetector(config.board()).detectBoard(grey)
+    if numbers is None:
+        return np.zeros(0, np.int64), np.zeros((0, 2))
+    uv = np.asarray(corners, dtype=float).reshape(-1, 2)
+    return np.asarray(numbers).ravel().astype(np.int64), uv
+
+
+def calibrate_on_board(
+    frames: Sequence[Frame], intrinsics: CameraIntrinsics, config: BoardConfig
+) -> HandEye:
+    """Finds the mount and the board's place that put its corners where they are seen.
+
+    Source: the reprojection error over all pictures, as in Strobl and Hirzinger,
+    "Optimal hand-eye calibration", 2006; standard deviations by White, 1980, each
+    picture a cluster, since the arm's error is the same for all of its corners.
+
+    Args:
+        frames: Pictures with the poses of the arm's model, X_WC; depth is not used.
+        intrinsics: Of the colour pictures, without distortion.
+        config: The board.
+
+    Raises:
+        CalibrationError: The board is seen in too few pictures.
+        ValueError: The board is out of bounds.
+    """
+    config.validate()
+    views = []
+    for frame in frames:
+        numbers, uv = find_corners(frame.color, config)
+        if frame.X_WC is not None and len(numbers) >= _FEWEST_CORNERS:
+            views.append((frame.X_WC, numbers, uv))
+    if len(views) < FEWEST:
+        raise CalibrationError(
+            f"{len(views)} pictures show the board and have a pose of the arm, "
+            f"{FEWEST} are needed."
+        )
+    p_BQs = np.asarray(config.board().getChessboardCorners(), dtype=float)
+    X_WB = _first_guess(views[0], p_BQs, intrinsics)
+    start = np.concatenate([np.zeros(6), _vector(X_WB)])
+    owner = np.repeat(np.arange(len(views)), [2 * len(view[1]) for view in views])
+
+    def residuals(x: FloatArray) -> FloatArray:
+        X_CCm, X_WB = _pose(x[:6]), _pose(x[6:])
+        parts = []
+        for X_WC, numbers, uv in views:
+            p_CQs = (X_WC @ X_CCm).inverse() @ X_WB @ p_BQs[numbers].T
+            parts.append((_project(p_CQs, intrinsics) - uv).ravel())
+        return np.concatenate(parts)
+
+    answer = least_squares(
+        residuals, start, loss="huber", f_scale=_HUBER, x_scale="jac"
+    )
+    inverse = np.linalg.inv(answer.jac.T @ answer.jac)
+    scores = answer.jac * residuals(answer.x)[:, None]
+    clusters = np.stack([scores[owner == k].sum(axis=0) for k in range(len(views))])
+    covariance = inverse @ clusters.T @ clusters @ inverse
+    return HandEye(
+        X_CCm=_pose(answer.x[:6]),
+        sigma=np.sqrt(np.diag(covariance)[:6]),
+        observed=np.ones(6),
+        pictures=len(views),
+        residual=float(np.sqrt(np.mean(residuals(answer.x) ** 2))),
+    )
+
+
+def _first_guess(
+    view: tuple[RigidTransform, IntArray, FloatArray],
+    p_BQs: FloatArray,
+    intrinsics: CameraIntrinsics,
+) -> RigidTransform:
+    X_WC, numbers, uv = view
+    camera = np.array(
+        [
+            [intrinsics.fx, 0.0, intrinsics.cx],
+            [0.0, intrinsics.fy, intrinsics.cy],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    _, turn, shift = cv2.solvePnP(p_BQs[numbers], uv, camera, None)
+    return X_WC @ _pose(np.concatenate([turn.ravel(), shift.ravel()]))
+
+
+def _project(p_CQs: FloatArray, intrinsics: CameraIntrinsics) -> FloatArray:
+    x, y, z = p_CQs
+    u = intrinsics.fx * x / z + intrinsics.cx
+    v = intrinsics.fy * y / z + intrinsics.cy
+    return np.stack([u, v], axis=1)
+
+
+def _pose(step: FloatArray) -> RigidTransform:
+    R = Rotation.from_rotvec(np.array(step[:3])).as_matrix()
+    return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), step[3:])
+
+
+def _vector(X: RigidTransform) -> FloatArray:
+    turn = Rotation.from_matrix(X.rotation().matrix()).as_rotvec()
+    return np.concatenate([turn, X.translation()])

@@ -1,0 +1,292 @@
+"""Fuses keyframes into one surface: weighted, counted, and cleared of ghosts."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import open3d as o3d
+from pydrake.math import RigidTransform
+
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
+from perception.mapping.config import MapperConfig
+from perception.mapping.keyframes.keyframe import BLOCK, Keyframe
+
+_REACH = 1 << 20
+"""Voxels along each axis, to either side: 5 km at 5 mm."""
+_BATCH = 8
+"""Keyframes whose voxels are added to the map at once."""
+_MIN_COUNT = 3
+_GHOST_SHARE = 0.2
+"""Voxels with less than this share of the best one beside them are no surface."""
+_SEEN_THROUGH = 0.02
+"""A point is seen through by depth that lies so much farther, m and share of it."""
+_CARVERS = 3
+"""Every so many-th keyframe looks for what it sees through; neighbours see the same."""
+_UNKNOWN_COS = 0.3
+"""Cosine of incidence where the grid has no normal."""
+_GOOD_RANGE = 0.7
+"""Range at which a frontal pixel weighs one, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class FusedMap(FrozenValue):
+    """The surface, one point a voxel.
+
+    Attributes:
+        p_WQs: (3, N) m, in W.
+        normals_W: (3, N) unit, in W, towards the cameras.
+        colors: (N, 3) uint8, RGB.
+        counts: (N,) int64, pixels fused.
+        frames: (N,) int64, keyframes that saw it.
+        variances: (N,) m², along the main plane's normal.
+        X_WV: Frame of the voxels: z is the main plane's normal.
+        carved: Points left out because later frames see through them.
+    """
+
+    p_WQs: FloatArray
+    normals_W: FloatArray
+    colors: npt.NDArray[np.uint8]
+    counts: IntArray
+    frames: IntArray
+    variances: FloatArray
+    X_WV: RigidTransform
+    carved: int
+
+
+def fuse(
+    keyframes: Sequence[Keyframe],
+    poses: Sequence[RigidTransform],
+    X_WV: RigidTransform,
+    intrinsics: CameraIntrinsics,
+    config: MapperConfig,
+) -> FusedMap:
+    """Fuses all keyframes at their poses.
+
+    A pixel weighs as the inverse variance of its depth, which grows as the fourth power
+    of range, times the squared cosine of its incidence.
+
+    Args:
+        keyframes: What to fuse.
+        poses: X_WC of each.
+        X_WV: Frame whose z is the main surface's normal, towards the cameras.
+        intrinsics: Of the camera.
+        config: Voxel size and stride.
+    """
+    keys, sums = np.zeros(0, np.int64), np.zeros((11, 0))
+    pending: list[tuple[IntArray, FloatArray]] = []
+    for keyframe, X_WC in zip(keyframes, poses, strict=True):
+        pending.append(_voxels(keyframe, X_WV.inverse() @ X_WC, intrinsics, config))
+        if len(pending) == _BATCH:
+            keys, sums = _add([(keys, sums), *pending])
+            pending = []
+    keys, sums = _join_layers(*_add([(keys, sums), *pending]), config.layer)
+    real = _real(keys, sums)
+    sums = sums[:, real]
+    mean = sums[1:5] / sums[0]
+    p_VQs = mean[:3]
+    open_air = _seen_through(X_WV @ p_VQs, keyframes, poses, intrinsics)
+    sums, mean, p_VQs = sums[:, ~open_air], mean[:, ~open_air], p_VQs[:, ~open_air]
+    p_WQs = X_WV @ p_VQs if p_VQs.size else np.zeros((3, 0))
+    return FusedMap(
+        p_WQs=p_WQs,
+        normals_W=_normals(p_WQs, X_WV.rotation().matrix()[:, 2], 3.0 * config.cell),
+        colors=np.rint(sums[5:8] / sums[8]).T.astype(np.uint8),
+        counts=sums[8].astype(np.int64),
+        frames=sums[9].astype(np.int64),
+        variances=np.maximum(mean[3] - mean[2] ** 2, 0.0),
+        X_WV=X_WV,
+        carved=int(open_air.sum()),
+    )
+
+
+def write_map(path: Path, fused: FusedMap) -> None:
+    """Writes the points as PLY with normals, colours, counts, frames and variances."""
+    cloud = o3d.t.geometry.PointCloud()
+    tensor = o3d.core.Tensor.from_numpy
+    cloud.point.positions = tensor(np.ascontiguousarray(fused.p_WQs.T))
+    cloud.point.normals = tensor(np.ascontiguousarray(fused.normals_W.T))
+    cloud.point.colors = tensor(np.ascontiguousarray(fused.colors))
+    cloud.point["count"] = tensor(fused.counts[:, None].astype(np.int32))
+    cloud.point["frames"] = tensor(fused.frames[:, None].astype(np.int32))
+    cloud.point["variance"] = tensor(fused.variances[:, None].astype(np.float32))
+    o3d.t.io.write_point_cloud(path, cloud)
+
+
+def write_voxels(path: Path, fused: FusedMap, edge: float) -> int:
+    """Writes the cubes that hold points: NPZ with `index`, `count`, `edge` and `X_WV`.
+
+    Cube (i, j, k) of `index` (n, 3) int32 reaches from `edge` (i, j, k) in V on; its
+    `count` (n,) is of pixels. V is the map's own frame, z out of the main surface.
+
+    Args:
+        path: The file.
+        fused: The map.
+        edge: Of a cube, m.
+
+    Returns:
+        How many there are.
+    """
+    p_VQs = fused.X_WV.inverse() @ fused.p_WQs if fused.p_WQs.size else fused.p_WQs
+    cells = np.floor(p_VQs / edge).astype(np.int32)
+    index, owner = np.unique(cells, axis=1, return_inverse=True)
+    count = np.bincount(owner.ravel(), fused.counts, index.shape[1]).astype(np.int64)
+    X_WV = fused.X_WV.GetAsMatrix4()
+    np.savez_compressed(path, index=index.T, count=count, edge=edge, X_WV=X_WV)
+    return int(index.shape[1])
+
+
+def write_mesh(path: Path, fused: FusedMap, depth: int = 9) -> int:
+    """Writes a Poisson mesh of the points, cut where there are none.
+
+    Source: Kazhdan and Hoppe, "Screened Poisson surface reconstruction", 2013.
+
+    Returns:
+        Its triangles.
+    """
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(fused.p_WQs.T.copy()))
+    cloud.normals = o3d.utility.Vector3dVector(fused.normals_W.T.copy())
+    cloud.colors = o3d.utility.Vector3dVector(fused.colors / 255.0)
+    mesh, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
+        cloud, depth=depth
+    )
+    densities = np.asarray(density)
+    mesh.remove_vertices_by_mask(densities < np.quantile(densities, 0.03))
+    o3d.io.write_triangle_mesh(path, mesh)
+    return len(mesh.triangles)
+
+
+def _pixels(
+    keyframe: Keyframe, intrinsics: CameraIntrinsics
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.uint8]]:
+    """Returns p_CQs (3, N), weights and colours of a keyframe's pixels."""
+    picture = keyframe.picture
+    if picture is None:
+        raise ValueError(f"keyframe {keyframe.number} was kept without its picture.")
+    depth_mm, stride = picture.depth_mm, picture.stride
+    row, column = np.nonzero(depth_mm)
+    z = depth_mm[row, column] / 1000.0
+    x = (stride * column - intrinsics.cx) / intrinsics.fx
+    y = (stride * row - intrinsics.cy) / intrinsics.fy
+    height, width = keyframe.z.shape
+    normals = keyframe.grid(intrinsics).normals[
+        np.minimum(stride * row // BLOCK, height - 1),
+        np.minimum(stride * column // BLOCK, width - 1),
+    ]
+    along = -(normals[:, 0] * x + normals[:, 1] * y + normals[:, 2])
+    cos = np.where(along > 0, along / np.sqrt(1 + x * x + y * y), _UNKNOWN_COS)
+    weights = (_GOOD_RANGE / z) ** 4 * cos**2
+    return np.stack([x * z, y * z, z]), weights, picture.colors[row, column]
+
+
+def _voxels(
+    keyframe: Keyframe,
+    X_VC: RigidTransform,
+    intrinsics: CameraIntrinsics,
+    config: MapperConfig,
+) -> tuple[IntArray, FloatArray]:
+    """Returns a keyframe's voxels, sorted, and their sums.
+
+    The rows of the sums: weight, weighted x, y, z and z², red, green, blue, pixels,
+    frames, layer.
+    """
+    p_CQs, weights, colors = _pixels(keyframe, intrinsics)
+    p_VQs = X_VC @ p_CQs if p_CQs.size else p_CQs
+    size = np.array([config.cell, config.cell, config.layer])[:, None]
+    i, j, k = np.floor(p_VQs / size + [[0.0], [0.0], [0.5]]).astype(np.int64) + _REACH
+    keys, index = np.unique((i * 2 * _REACH + j) * 2 * _REACH + k, return_inverse=True)
+    z = p_VQs[2]
+    rows = [weights, *(weights * p_VQs), weights * z * z, *colors.T]
+    sums = [np.bincount(index, row, keys.size) for row in rows]
+    counts = np.bincount(index, minlength=keys.size).astype(float)
+    return keys, np.stack([*sums, counts, np.ones(keys.size), keys * 0.0])
+
+
+def _add(parts: list[tuple[IntArray, FloatArray]]) -> tuple[IntArray, FloatArray]:
+    keys = np.concatenate([part[0] for part in parts])
+    if not keys.size:
+        return keys, np.zeros((11, 0))
+    order = np.argsort(keys, kind="stable")
+    keys = keys[order]
+    first = np.flatnonzero(np.concatenate([[True], np.diff(keys) > 0]))
+    sums = np.concatenate([part[1] for part in parts], axis=1)[:, order]
+    return keys[first], np.add.reduceat(sums, first, axis=1)
+
+
+def _join_layers(
+    keys: IntArray, sums: FloatArray, layer: float
+) -> tuple[IntArray, FloatArray]:
+    """Joins voxels on top of each other whose means are closer than half a layer."""
+    if not keys.size:
+        return keys, sums
+    z = sums[3] / sums[0]
+    apart = (np.diff(keys) > 1) | (np.diff(z) > layer / 2)
+    first = np.flatnonzero(np.concatenate([[True], apart]))
+    joined = np.add.reduceat(sums, first, axis=1)
+    joined[9] = np.maximum.reduceat(sums[9], first)
+    return keys[first], joined
+
+
+def _real(keys: IntArray, sums: FloatArray) -> BoolArray:
+    """Finds voxels with enough pixels and frames, as in `VoxelMap.surface_map`.
+
+    Enough is a share of what the best voxel of the 3 x 3 columns round it got: a flying
+    pixel is not seen again when the camera has moved, a surface is.
+    """
+    if not keys.size:
+        return np.zeros(0, dtype=np.bool_)
+    columns, index = np.unique(keys // (2 * _REACH), return_inverse=True)
+    real = sums[8] >= _MIN_COUNT
+    for row in (8, 9):
+        own = np.zeros(columns.size)
+        np.maximum.at(own, index, sums[row])
+        best = own.copy()
+        for i, j in itertools.product((-1, 0, 1), repeat=2):
+            beside = columns + i * 2 * _REACH + j
+            place = np.minimum(np.searchsorted(columns, beside), columns.size - 1)
+            best = np.maximum(best, np.where(columns[place] == beside, own[place], 0.0))
+        real &= sums[row] >= _GHOST_SHARE * best[index]
+    return np.asarray(real)
+
+
+def _seen_through(
+    p_WQs: FloatArray,
+    keyframes: Sequence[Keyframe],
+    poses: Sequence[RigidTransform],
+    intrinsics: CameraIntrinsics,
+) -> BoolArray:
+    """Finds points that more keyframes see through than see."""
+    through = np.zeros(p_WQs.shape[1], dtype=np.int32)
+    seen = np.zeros_like(through)
+    if not p_WQs.size:
+        return through > 0
+    for keyframe, X_WC in list(zip(keyframes, poses, strict=True))[::_CARVERS]:
+        picture = keyframe.picture
+        if picture is None:
+            continue
+        x, y, z = X_WC.inverse() @ p_WQs
+        ahead = np.flatnonzero(z > 0.1)
+        depth_of = z[ahead]
+        u = (intrinsics.fx * x[ahead] / depth_of + intrinsics.cx) / picture.stride
+        v = (intrinsics.fy * y[ahead] / depth_of + intrinsics.cy) / picture.stride
+        height, width = picture.shape
+        inside = (u > 0) & (u < width - 1) & (v > 0) & (v < height - 1)
+        ahead, z_in = ahead[inside], depth_of[inside]
+        row, column = np.rint(v[inside]).astype(int), np.rint(u[inside]).astype(int)
+        depth = picture.depth_mm[row, column] / 1000.0
+        margin = _SEEN_THROUGH * (1.0 + z_in)
+        through[ahead] += depth > z_in + margin
+        seen[ahead] += np.abs(depth - z_in) <= margin
+    return np.asarray((through >= 2) & (through > seen))
+
+
+def _normals(p_WQs: FloatArray, towards_W: FloatArray, radius: float) -> FloatArray:
+    if not p_WQs.size:
+        return np.zeros((3, 0))
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p_WQs.T))
+    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius, 30))
+    cloud.orient_normals_to_align_with_direction(towards_W)
+    return np.asarray(cloud.normals).T.copy()

@@ -1,0 +1,288 @@
+"""Links between two keyframes, by appearance or geometry, and what they observe."""
+
+import enum
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from scipy.spatial.transform import Rotation
+
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.ground import FloatArray, FrozenValue
+from perception.mapping.config import PoseGraphConfig
+from perception.mapping.keyframes.keyframe import BLOCK, PointGrid
+from perception.mapping.keyframes.view import Features
+from perception.mapping.pose_graph.poses import skew
+
+_LEVER = 0.4
+"""Length that makes rotations comparable to displacements, m: half a view."""
+_COMPLEXITY = 0.04
+"""Directions along which normals give less than this share of the strongest
+information are not observed. RTAB-Map's `Icp/PointToPlaneMinComplexity` is 0.02; what a
+D435 sees of a window's edges passes that, and moves the camera along the wall."""
+_NUMERICAL = 1e-6
+"""Directions under this share of the strongest are zero but for rounding."""
+_ICP_ROUNDS = 6
+_ICP_GATE = 0.03
+_ICP_POINTS = 3000
+_RATIO = 0.85
+"""Lowe's: the best match is so much better than the second."""
+
+
+class LinkKind(enum.StrEnum):
+    """How a link was found."""
+
+    APPEARANCE = "appearance"
+    GEOMETRY = "geometry"
+
+
+@dataclass(frozen=True, eq=False)
+class Link(FrozenValue):
+    """A measured pose of keyframe j in keyframe i.
+
+    Attributes:
+        i: Index of the older keyframe.
+        j: Index of the newer one.
+        kind: How it was found.
+        X_ij: Measured pose.
+        information: (6, 6), of a step of X_ij (see `Poses`); singular where the link
+            observes nothing.
+        inliers: Matches or points it rests on.
+    """
+
+    i: int
+    j: int
+    kind: LinkKind
+    X_ij: RigidTransform
+    information: FloatArray
+    inliers: int
+
+    @property
+    def rank(self) -> int:
+        """Directions observed, 0 to 6."""
+        return int(np.linalg.matrix_rank(self.information, hermitian=True))
+
+
+def floored(
+    information: FloatArray, config: PoseGraphConfig, complexity: float = 0.0
+) -> FloatArray:
+    """Keeps information honest: no direction is better than the link's floor.
+
+    Args:
+        information: (6, 6) of rotation and displacement.
+        config: `link_sigma` and `link_sigma_deg` are used.
+        complexity: Directions with less than this share of the strongest are dropped.
+
+    Returns:
+        (6, 6).
+    """
+    scale = np.array([_LEVER] * 3 + [1.0] * 3)
+    values, axes = np.linalg.eigh(information / np.outer(scale, scale))
+    floor = config.link_sigma**2 + (np.deg2rad(config.link_sigma_deg) * _LEVER) ** 2
+    kept = values > max(complexity * values[-1], 1e-9)
+    capped = np.where(kept, 1.0 / (1.0 / np.where(kept, values, 1.0) + floor), 0.0)
+    return np.asarray((axes * capped) @ axes.T * np.outer(scale, scale))
+
+
+def link_by_appearance(
+    a: Features,
+    b: Features,
+    intrinsics: CameraIntrinsics,
+    config: PoseGraphConfig,
+    ends: tuple[int, int],
+) -> tuple[Link | None, int]:
+    """Matches corners, finds the pose by PnP and refines it.
+
+    Args:
+        a: Features of the older keyframe.
+        b: Of the newer one.
+        intrinsics: Of the camera.
+        config: Thresholds and sigmas.
+        ends: Indices of the two keyframes.
+
+    Returns:
+        The link, or None if too few matches agree, and how many do.
+    """
+    if min(len(a.uv), len(b.uv)) < config.min_inliers:
+        return None, min(len(a.uv), len(b.uv))
+    matcher = cv2.BFMatcher.create(cv2.NORM_HAMMING)
+    pairs = matcher.knnMatch(a.descriptors, b.descriptors, k=2)
+    good = [p[0] for p in pairs if p[0].distance < _RATIO * p[1].distance]
+    if len(good) < config.min_inliers:
+        return None, len(good)
+    first = np.array([match.queryIdx for match in good])
+    second = np.array([match.trainIdx for match in good])
+    camera = np.array(
+        [
+            [intrinsics.fx, 0, intrinsics.cx],
+            [0, intrinsics.fy, intrinsics.cy],
+            [0, 0, 1],
+        ]
+    )
+    cv2.setRNGSeed(1)
+    found, turn, shift, inliers = cv2.solvePnPRansac(
+        a.p_Cs[first],
+        b.uv[second],
+        camera,
+        None,
+        reprojectionError=3.0,
+        iterationsCount=200,
+        confidence=0.999,
+        flags=cv2.SOLVEPNP_EPNP,
+    )
+    count = 0 if inliers is None else len(inliers)
+    if not found or count < max(config.min_inliers, len(good) // 4):
+        return None, count
+    X_ji = RigidTransform(
+        RotationMatrix(Rotation.from_rotvec(turn.ravel()).as_matrix()), shift.ravel()
+    )
+    kept = inliers.ravel()
+    X_ij, information = _refine(
+        X_ji.inverse(), a, b, first[kept], second[kept], intrinsics, config
+    )
+    link = Link(*ends, LinkKind.APPEARANCE, X_ij, floored(information, config), count)
+    return link, count
+
+
+def _refine(
+    X_ij: RigidTransform,
+    a: Features,
+    b: Features,
+    first: FloatArray,
+    second: FloatArray,
+    intrinsics: CameraIntrinsics,
+    config: PoseGraphConfig,
+) -> tuple[RigidTransform, FloatArray]:
+    """Minimises the reprojection error in both pictures and the difference in depth."""
+    focal = np.array([intrinsics.fx, intrinsics.fy])
+    middle = np.array([intrinsics.cx, intrinsics.cy])
+    information = np.zeros((6, 6))
+    for _ in range(4):
+        information[:] = 0.0
+        slope = np.zeros(6)
+        R = X_ij.rotation().matrix()
+        # Points of b seen by camera a: the step moves them by R (v - p x a).
+        moved = b.p_Cs[second] @ R.T + X_ij.translation()
+        by_step = np.concatenate(
+            [-R @ skew(b.p_Cs[second]), np.tile(R, (len(moved), 1, 1))], axis=2
+        )
+        # Points of a seen by camera b: they move the other way.
+        back = (a.p_Cs[first] - X_ij.translation()) @ R
+        back_step = np.concatenate(
+            [skew(back), np.tile(-np.eye(3), (len(back), 1, 1))], 2
+        )
+        for points, jacobian, features, index in (
+            (moved, by_step, a, first),
+            (back, back_step, b, second),
+        ):
+            z = points[:, 2]
+            residual = np.empty((len(z), 3))
+            residual[:, :2] = focal * points[:, :2] / z[:, None] + middle
+            residual[:, :2] -= features.uv[index]
+            residual[:, 2] = z - features.p_Cs[index, 2]
+            project = np.zeros((len(z), 3, 3))
+            project[:, 0, 0], project[:, 1, 1] = focal[0] / z, focal[1] / z
+            project[:, 0, 2] = -focal[0] * points[:, 0] / z**2
+            project[:, 1, 2] = -focal[1] * points[:, 1] / z**2
+            project[:, 2, 2] = 1.0
+            sigma = np.empty((len(z), 3))
+            sigma[:, :2] = config.pixel_sigma
+            sigma[:, 2] = 0.004 * z**2  # A D435's: 0.08 px of disparity.
+            rows = (project @ jacobian / sigma[:, :, None]).reshape(-1, 6)
+            errors = (residual / sigma).ravel()
+            weight = 1.0 / np.maximum(1.0, np.abs(errors) / 1.5)  # Huber's.
+            information += rows.T @ (rows * weight[:, None]) / 2.0
+            slope += rows.T @ (errors * weight) / 2.0
+        step = -np.linalg.solve(information + 1e-6 * np.eye(6), slope)
+        turn = RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix())
+        X_ij = X_ij @ RigidTransform(turn, step[3:])
+    return X_ij, information
+
+
+def link_by_geometry(
+    a: PointGrid,
+    b: PointGrid,
+    X_ij: RigidTransform,
+    intrinsics: CameraIntrinsics,
+    config: PoseGraphConfig,
+    ends: tuple[int, int],
+) -> Link | None:
+    """Registers points to planes, along the directions that the normals determine.
+
+    Source: Chen and Medioni, "Object modelling by registration of multiple range
+    images", 1992 (point to plane); Zhang et al., "On degeneracy of optimization-based
+    state estimation problems", 2016 (steps along determined directions only).
+
+    Args:
+        a: Grid of the older keyframe.
+        b: Of the newer one.
+        X_ij: First guess; what is not determined stays as it is in it.
+        intrinsics: Of the camera.
+        config: The link's floor is used.
+        ends: Indices of the two keyframes.
+
+    Returns:
+        The link, or None if the two share too little.
+    """
+    points = b.points[b.valid]
+    points = points[:: max(1, len(points) // _ICP_POINTS)]
+    scale = np.ones(6)
+    information, to_center = np.zeros((6, 6)), np.eye(6)
+    kept = np.zeros((6, 0))
+    count, rms = 0, 0.0
+    for _ in range(_ICP_ROUNDS):
+        found = _correspond(a, points, X_ij, intrinsics)
+        count = len(found[0])
+        if count < max(100, len(points) // 10):
+            return None
+        p_j, n_j, e = found
+        # About the points' centre, where turning and moving are told apart best.
+        center = p_j.mean(axis=0)
+        to_center[3:, :3] = -skew(center)
+        scale[:3] = np.sqrt(np.mean(np.sum((p_j - center) ** 2, axis=1)))
+        rows = np.hstack([np.cross(p_j - center, n_j), n_j]) / scale
+        weight = 1.0 / np.maximum(1.0, np.abs(e) / (2.0 * np.median(np.abs(e)) + 1e-4))
+        information = rows.T @ (rows * weight[:, None])
+        values, axes = np.linalg.eigh(information)
+        kept = axes[:, values > _COMPLEXITY * values[-1]]
+        # The shortest step of the camera that does what the kept directions ask for.
+        wanted = kept.T * scale @ to_center / scale
+        asked = np.linalg.solve(
+            kept.T @ information @ kept, kept.T @ (rows.T @ (e * weight))
+        )
+        step = -np.linalg.pinv(wanted) @ asked / scale
+        rms = float(np.sqrt(np.average(e**2, weights=weight)))
+        turn = RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix())
+        X_ij = X_ij @ RigidTransform(turn, step[3:])
+        if np.linalg.norm(step * scale) < 2e-5:
+            break
+    # A quarter of the points are independent, as for planes.
+    determined = kept @ kept.T @ information @ kept @ kept.T
+    information = determined * np.outer(scale, scale) / (4.0 * max(rms, 5e-4) ** 2)
+    honest = to_center.T @ floored(information, config, _NUMERICAL) @ to_center
+    return Link(*ends, LinkKind.GEOMETRY, X_ij, honest, count)
+
+
+def _correspond(
+    a: PointGrid, points: FloatArray, X_ij: RigidTransform, intrinsics: CameraIntrinsics
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Finds for points of j those of i on the same ray.
+
+    Returns:
+        p_Cjs (n, 3), normals of the other points (n, 3) in j, and distances along them.
+    """
+    R = X_ij.rotation().matrix()
+    moved = points @ R.T + X_ij.translation()
+    z = np.maximum(moved[:, 2], 1e-3)
+    column = (intrinsics.fx * moved[:, 0] / z + intrinsics.cx) / BLOCK
+    row = (intrinsics.fy * moved[:, 1] / z + intrinsics.cy) / BLOCK
+    height, width = a.valid.shape
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    column, row = column[inside].astype(int), row[inside].astype(int)
+    normals = a.normals[row, column]
+    away = moved[inside] - a.points[row, column]
+    distance = np.sum(normals * away, axis=1)
+    near = np.linalg.norm(away, axis=1) < _ICP_GATE * (1.0 + z[inside])
+    near &= (np.abs(distance) < _ICP_GATE) & normals.any(axis=1)
+    return points[inside][near], normals[near] @ R, distance[near]

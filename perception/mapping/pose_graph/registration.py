@@ -1,0 +1,117 @@
+"""To which older keyframes a new one is registered, and by what."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from perception.depth_camera.depth import CameraIntrinsics
+from perception.mapping.config import PoseGraphConfig
+from perception.mapping.keyframes.keyframe import Keyframe
+from perception.mapping.pose_graph.links import (
+    Link,
+    LinkKind,
+    link_by_appearance,
+    link_by_geometry,
+)
+from perception.mapping.pose_graph.poses import angle_deg
+
+_RECENT = 2
+"""Keyframes back that a new one is always registered to."""
+_CANDIDATES = 12
+"""Older keyframes, the nearest ones, whose overlap is looked at."""
+_OVERLAP = 0.3
+"""Share of an older keyframe's points that the new one has to see."""
+_GATE = 0.03
+"""A link farther from the arm's relative pose than this, m, is no link."""
+_GATE_DEG = 2.0
+
+
+def overlap(
+    keyframe: Keyframe, X_CK: RigidTransform, intrinsics: CameraIntrinsics
+) -> float:
+    """Returns the share of a keyframe's points that another pose sees.
+
+    Args:
+        keyframe: Whose points.
+        X_CK: Its pose, seen from the camera at the other one.
+        intrinsics: Of the camera.
+    """
+    if not keyframe.sample.size:
+        return 0.0
+    x, y, z = X_CK @ keyframe.sample.astype(float)
+    z = np.maximum(z, 1e-3)
+    u = intrinsics.fx * x / z + intrinsics.cx
+    v = intrinsics.fy * y / z + intrinsics.cy
+    inside = (u >= 0) & (u < intrinsics.width) & (v >= 0) & (v < intrinsics.height)
+    return float(inside.mean())
+
+
+def find_links(
+    keyframes: Sequence[Keyframe],
+    poses: Sequence[RigidTransform],
+    intrinsics: CameraIntrinsics,
+    config: PoseGraphConfig,
+) -> list[Link]:
+    """Registers the last keyframe to those before it and to older ones it overlaps.
+
+    Args:
+        keyframes: In order of time.
+        poses: X_WC, where they are thought to be.
+        intrinsics: Of the camera.
+        config: `max_links` and the sigmas are used.
+    """
+    if not config.max_links:
+        return []
+    index = len(keyframes) - 1
+    first_recent = max(0, index - _RECENT)
+    places = np.array([X.translation() for X in poses])
+    away = np.linalg.norm(places[:first_recent] - places[index], axis=1)
+    X_CW = poses[index].inverse()
+    older = [
+        (overlap(keyframes[k], X_CW @ poses[k], intrinsics), k)
+        for k in np.argsort(away)[:_CANDIDATES].tolist()
+    ]
+    # The nearest in the picture, but no two neighbours of each other.
+    chosen: list[int] = []
+    for seen, k in sorted(older, reverse=True):
+        if seen > _OVERLAP and all(abs(k - other) > 1 for other in chosen):
+            chosen.append(k)
+    chosen = [*range(first_recent, index), *chosen][: config.max_links]
+    found = [
+        _register(
+            keyframes[k],
+            keyframes[index],
+            poses[k].inverse() @ poses[index],
+            intrinsics,
+            config,
+            (k, index),
+        )
+        for k in chosen
+    ]
+    return [link for link in found if link is not None]
+
+
+def _register(
+    a: Keyframe,
+    b: Keyframe,
+    guess: RigidTransform,
+    intrinsics: CameraIntrinsics,
+    config: PoseGraphConfig,
+    ends: tuple[int, int],
+) -> Link | None:
+    """Links two keyframes by appearance, or else by geometry."""
+    link, _ = link_by_appearance(a.features, b.features, intrinsics, config, ends)
+    if link is None:
+        grids = a.grid(intrinsics), b.grid(intrinsics)
+        link = link_by_geometry(*grids, guess, intrinsics, config, ends)
+    if link is None:
+        return None
+    off = guess.inverse() @ link.X_ij
+    arm = a.X_arm is not None and b.X_arm is not None
+    if (arm or link.kind is LinkKind.GEOMETRY) and (
+        np.linalg.norm(off.translation()) > _GATE
+        or angle_deg(off.rotation()) > _GATE_DEG
+    ):
+        return None
+    return link

@@ -1,0 +1,270 @@
+"""Which plane is the wall, and the tile laid on it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from perception.config import SegmentationConfig
+from perception.errors import AmbiguousWallError, NoWallError, ObliqueWallError
+from perception.ground import BoolArray, FloatArray
+from perception.paper_steps.planes import Plane, segment_planes
+from perception.values import Wall
+
+MIN_POINTS = 100  # Fewer are a stray return, not a surface.
+_STEEPEST = math.radians(80.0)  # Beyond, the centre line runs along the plane.
+_LEVEL = math.cos(math.radians(30.0))  # Planes closer to level are floors.
+_EQUAL = 0.8  # A plane worth this share of the best is as good.
+# Inlier distance at first sight, m. Two looks show little of the wall: within the
+# paper's 3 cm a plane aslant through wall, door and boxes gathers more points than it.
+_FIRST_SIGHT_THRESHOLD = 0.01
+
+
+def find_wall(
+    p_WQs: FloatArray,
+    X_WT_expected: RigidTransform,
+    *,
+    width: float,
+    height: float,
+    config: SegmentationConfig,
+    seed: int,
+    up_W: FloatArray | None = None,
+) -> Wall:
+    """Finds the wall near where it is expected and lays the tile on it.
+
+    The wall is the best plane within the configured distance and angle of the expected
+    one (see `choose_plane`).
+
+    Args:
+        p_WQs: (3, N) m, in W; non-finite points are dropped.
+        X_WT_expected: Tile frame where the job expects it.
+        width: Of the tile, m, along T x.
+        height: Of the tile, m, along T y.
+        config: Thresholds.
+        seed: Of RANSAC's random triples.
+        up_W: (3,) unit, against gravity; see `choose_plane`.
+
+    Returns:
+        The wall; its T is as `wall_on_plane` lays it.
+
+    Raises:
+        NoWallError: There are too few points, or no plane is near the expected one.
+    """
+    config.validate()
+    p_WQs = p_WQs[:, finite_points(p_WQs)]
+    _, planes = segment_planes(
+        p_WQs,
+        threshold=min(config.distance_threshold, _FIRST_SIGHT_THRESHOLD),
+        stop_fraction=config.stop_fraction,
+        max_planes=config.max_planes,
+        rng=np.random.default_rng(seed),
+    )
+    number = choose_plane(
+        planes,
+        X_WT_expected,
+        width=width,
+        height=height,
+        total=p_WQs.shape[1],
+        config=config,
+        up_W=up_W,
+    )
+    return wall_on_plane(
+        planes[number],
+        X_WT_expected,
+        width=width,
+        height=height,
+        total=p_WQs.shape[1],
+    )
+
+
+def finite_points(p_WQs: FloatArray) -> BoolArray:
+    """Finds the finite points of a cloud.
+
+    Args:
+        p_WQs: (3, N) m, in any frame.
+
+    Returns:
+        (N,) True = finite.
+
+    Raises:
+        NoWallError: There are fewer than `MIN_POINTS`; names the numbers.
+    """
+    finite: BoolArray = np.all(np.isfinite(p_WQs), axis=0)
+    count = int(np.count_nonzero(finite))
+    if count < MIN_POINTS:
+        raise NoWallError(
+            f"the cloud has {count} finite points of {finite.size}; "
+            f"a wall needs at least {MIN_POINTS}."
+        )
+    return finite
+
+
+def deviation(
+    plane: Plane, X_WT_expected: RigidTransform, *, width: float, height: float
+) -> tuple[float, float]:
+    """Compares a plane with the expected wall.
+
+    Args:
+        plane: In W.
+        X_WT_expected: Tile frame where the job expects it.
+        width: Of the tile, m.
+        height: Of the tile, m.
+
+    Returns:
+        How far the plane lies from the expected tile's centre along T z, m, positive
+        towards the robot (infinite for a plane nearly along T z); and the angle of the
+        normals, rad, 0 to pi/2.
+    """
+    p_WC = X_WT_expected @ np.array([width / 2.0, height / 2.0, 0.0])
+    slope = float(plane.normal @ X_WT_expected.rotation().matrix()[:, 2])
+    angle = math.acos(min(1.0, abs(slope)))
+    if angle > _STEEPEST:
+        return math.inf, angle
+    return (plane.offset - float(plane.normal @ p_WC)) / slope, angle
+
+
+def choose_plane(
+    planes: Sequence[Plane],
+    X_WT_expected: RigidTransform,
+    *,
+    width: float,
+    height: float,
+    total: int,
+    config: SegmentationConfig,
+    up_W: FloatArray | None = None,
+) -> int:
+    """Chooses the plane that is the wall.
+
+    A door may fill most of a picture; so the points of a plane count less the farther
+    it lies from where the wall is expected: half the distance tolerance is taken as one
+    standard deviation.
+
+    Args:
+        planes: In W.
+        X_WT_expected: Tile frame where the job expects it.
+        width: Of the tile, m.
+        height: Of the tile, m.
+        total: Points of the cloud.
+        config: Tolerances.
+        up_W: (3,) unit, against gravity; planes nearly level are floor or ceiling and
+            no wall. Not looked at if left out.
+
+    Returns:
+        Index of the best plane within the tolerances.
+
+    Raises:
+        AmbiguousWallError: Two planes apart from each other are about equally good.
+        ObliqueWallError: The largest plane is in its place but turned too far.
+        NoWallError: There is none; names the closest misses.
+    """
+    limit = config.wall_distance_tolerance
+    limit_angle = math.radians(config.wall_angle_tolerance_deg)
+    least = config.min_wall_share * total
+    upright = [
+        plane
+        for plane in planes
+        if up_W is None or abs(float(plane.normal @ up_W)) < _LEVEL
+    ]
+    offs = {
+        id(plane): deviation(plane, X_WT_expected, width=width, height=height)
+        for plane in planes
+    }
+
+    def worth(plane: Plane) -> float:
+        return plane.count * math.exp(-2.0 * (offs[id(plane)][0] / limit) ** 2)
+
+    good = [
+        plane
+        for plane in upright
+        if abs(offs[id(plane)][0]) <= limit
+        and offs[id(plane)][1] <= limit_angle
+        and plane.count >= least
+    ]
+    good.sort(key=worth, reverse=True)
+    for other in good[1:]:
+        apart = abs(offs[id(good[0])][0] - offs[id(other)][0])
+        # Closer planes are slices of one uneven wall.
+        if apart > 2.0 * config.distance_threshold:
+            ratio = worth(other) / worth(good[0])
+            if ratio >= _EQUAL:
+                raise AmbiguousWallError(
+                    f"two planes {apart:.3f} m apart are about equally good walls, "
+                    f"{good[0].count / total:.0%} and {other.count / total:.0%} of the "
+                    "points; the expected distance of the wall must tell them apart."
+                )
+    if good:
+        return next(i for i, plane in enumerate(planes) if plane is good[0])
+    if not planes:
+        raise NoWallError(f"there is no plane among {total} points.")
+    if not upright:
+        raise NoWallError(
+            f"all {len(planes)} planes are level, as floors are; none is a wall."
+        )
+    largest = max(upright, key=lambda plane: plane.count)
+    distance, angle = offs[id(largest)]
+    place = "runs past the tile"
+    if math.isfinite(distance):
+        side = "before" if distance > 0 else "behind"
+        place = f"lies {abs(distance):.3f} m {side} the expected wall"
+    oblique = abs(distance) <= limit and largest.count >= least
+    raise (ObliqueWallError if oblique else NoWallError)(
+        f"no plane with {config.min_wall_share:.0%} or more of the points is within "
+        f"{limit:g} m and {config.wall_angle_tolerance_deg:g} deg of the expected "
+        f"wall; the largest of {len(upright)} has {largest.count / total:.0%} "
+        f"of the points, {place} and is turned {math.degrees(angle):.1f} deg from it."
+    )
+
+
+def wall_on_plane(
+    plane: Plane,
+    X_WT_expected: RigidTransform,
+    *,
+    width: float,
+    height: float,
+    total: int,
+) -> Wall:
+    """Makes the wall of a plane: its tile frame and its figures.
+
+    T's z is the plane's normal on the robot's side, T's y as close to the expected T y
+    as the plane allows, and the tile's centre where the plane meets the line through
+    the expected tile's centre along the expected T z.
+
+    Args:
+        plane: In W.
+        X_WT_expected: Tile frame where the job expects it.
+        width: Of the tile, m.
+        height: Of the tile, m.
+        total: Points of the cloud.
+
+    Returns:
+        The wall.
+    """
+    expected = X_WT_expected.rotation().matrix()
+    distance, _ = deviation(plane, X_WT_expected, width=width, height=height)
+    p_TC = np.array([width / 2.0, height / 2.0, 0.0])
+    p_WC = X_WT_expected @ p_TC + distance * expected[:, 2]
+    normal = plane.normal * np.sign(plane.normal @ expected[:, 2])
+    R_WT = upright_rotation(normal, expected[:, 1])
+    return Wall(
+        X_WT=RigidTransform(R_WT, p_WC - R_WT @ p_TC),
+        rms=plane.rms,
+        inlier_count=plane.count,
+        inlier_share=plane.count / total,
+    )
+
+
+def upright_rotation(normal_W: FloatArray, up_W: FloatArray) -> RotationMatrix:
+    """Returns R_WT with T z along a normal and T y as close to `up_W` as that allows.
+
+    Args:
+        normal_W: (3,) unit, in W.
+        up_W: (3,) in W, not along the normal.
+
+    Returns:
+        The rotation.
+    """
+    y = up_W - (up_W @ normal_W) * normal_W
+    y /= np.linalg.norm(y)
+    matrix = np.stack([np.cross(y, normal_W), y, normal_W], axis=1)
+    return RotationMatrix.ProjectToRotationMatrix(matrix)

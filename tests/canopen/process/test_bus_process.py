@@ -1,0 +1,199 @@
+"""The bus in its own process against drives in another, in real time."""
+
+import dataclasses
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from painter.canopen.config.bus_file import load_bus
+from painter.canopen.master.feedback import Phase
+from painter.canopen.master.setpoints import Setpoint
+from painter.canopen.process.bus_process import BusProcess
+from painter.canopen.process.mailbox import Mailbox
+from painter.canopen.wire.candump import read_log
+from painter.canopen.wire.links import LinkError, LocalLink
+from painter.errors import BusError
+from painter.resources import models_path
+
+# A busy test machine may hold up any process for long; nothing here depends on speed.
+PATIENCE = 60.0
+
+
+def wait_for(condition, what):
+    end = time.monotonic() + PATIENCE
+    while not (found := condition()):
+        assert time.monotonic() < end, what
+        time.sleep(0.01)
+    return found
+
+
+@pytest.fixture
+def bus(tmp_path):
+    bus = load_bus(models_path("bus", "painter.bus.yaml"))
+    bus = dataclasses.replace(
+        bus, interface="local", channel=str(tmp_path / "can"), cycle=0.02
+    )
+    # Drives and bus share two cores with other tests: seconds, not milliseconds.
+    bus.timeouts = dataclasses.replace(
+        bus.timeouts, heartbeat=3.0, tpdo=2.0, setpoint=2.0, boot=20.0, sdo=2.0,
+        brake=20.0, transition=20.0, rpdo_cycles=200,
+    )  # fmt: skip
+    bus.io = dataclasses.replace(bus.io, deadline=4.0)
+    return bus
+
+
+@pytest.fixture
+def drives(bus):
+    code = "from painter.cli.main import main; main()"
+    command = [sys.executable, "-c", code, "drives", "--json"]
+    command += ["--interface", "local", "--channel", bus.channel]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+    def is_there():
+        try:
+            LocalLink(bus.channel).close()
+        except LinkError:
+            assert process.poll() is None, process.stderr.read()
+            return False
+        return True
+
+    wait_for(is_there, "the drives do not listen")
+    yield process
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE)
+
+
+def phase_is(process, phase):
+    def check():
+        report = process.report()
+        return report if report and report.feedback.phase == phase else None
+
+    return check
+
+
+def test_the_arm_moves_and_switches_off(bus, drives):
+    with BusProcess(bus) as dut:
+        dut.start()
+        report = wait_for(phase_is(dut, Phase.ENABLED), "not enabled")
+        q0, start = report.feedback.q, time.monotonic() + 0.2
+        goal, duration = np.array([0.1, 0.1, 0.1, 0.1, -0.1]), 0.5
+        points = []
+        for i in range(51):
+            s = i / 50
+            q = q0 + s * s * (3 - 2 * s) * goal
+            v = 6 * s * (1 - s) / duration * goal
+            points.append(Setpoint(start + s * duration, q, v))
+        dut.push(points)
+        wait_for(
+            lambda: np.allclose(dut.report().feedback.q, q0 + goal, atol=1e-3),
+            "the goal is not reached",
+        )
+        assert dut.report().feedback.phase == Phase.ENABLED
+        dut.stop("a test says so.")
+        wait_for(phase_is(dut, Phase.STOPPED), "not stopped")
+        assert dut.report().feedback.reason == "a test says so."
+        dut.acknowledge()
+        wait_for(phase_is(dut, Phase.ENABLED), "not enabled again")
+    assert not dut.is_alive
+
+
+def test_a_refused_command_is_in_the_report(bus, drives):
+    with BusProcess(bus) as dut:
+        dut.acknowledge()
+        refusal = wait_for(
+            lambda: (r := dut.report()) and r.refusal, "nothing was refused"
+        )
+        assert "nothing to acknowledge" in refusal
+
+
+def test_a_bus_that_cannot_be_opened_says_why(bus):
+    with BusProcess(bus) as dut:
+        wait_for(lambda: not dut.is_alive, "still alive")
+        with pytest.raises(BusError, match="local .*: No such file"):
+            dut.report()
+
+
+def test_the_arm_stops_when_the_commanding_program_is_killed(bus, drives, tmp_path):
+    code = textwrap.dedent("""
+        import pickle, sys, time
+        from painter.canopen.process.bus_process import BusProcess
+        from painter.canopen.master.feedback import Phase
+        if __name__ == "__main__":
+            dut = BusProcess(pickle.loads(sys.stdin.buffer.read()))
+            dut.start()
+            while not ((r := dut.report()) and r.feedback.phase == Phase.ENABLED):
+                time.sleep(0.01)
+            print(dut.pid, flush=True)
+            time.sleep(1000)
+    """)
+    script = tmp_path / "program.py"
+    script.write_text(code)
+    program = subprocess.Popen(
+        [sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    program.stdin.write(pickle.dumps(bus))
+    program.stdin.close()
+    pid = int(program.stdout.readline())
+    program.kill()
+    program.wait()
+
+    def is_gone():
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+        return state == "Z"
+
+    wait_for(is_gone, "the bus process lives on")
+    program.stdout.close()
+    drives.send_signal(signal.SIGINT)
+    out, _ = drives.communicate(timeout=PATIENCE)
+    assert out.count(b"SWITCH ON DISABLED") == 5
+
+
+def test_drives_stop_and_the_log_is_whole_when_the_bus_process_is_killed(
+    bus, drives, tmp_path
+):
+    log = tmp_path / "bus.log"
+    dut = BusProcess(bus, log=log)
+    dut.start()
+    wait_for(phase_is(dut, Phase.ENABLED), "not enabled")
+    os.kill(dut.pid, signal.SIGKILL)
+    wait_for(lambda: not dut.is_alive, "still alive")
+    with pytest.raises(BusError, match="has ended"):
+        dut.report()
+    dut.close()
+    frames = [record.frame for record in read_log(log).records]
+    enable = b"\x0f\0"  # Controlword of all five RPDOs.
+    enabled = {f.cob_id for f in frames if f.data[:2] == enable and f.cob_id < 0x300}
+    assert enabled >= {0x201, 0x202, 0x203, 0x204, 0x205}
+    assert log.read_text().endswith("\n")
+    time.sleep(bus.timeouts.heartbeat + 0.5)  # The drives' own watch.
+    drives.send_signal(signal.SIGINT)
+    out, _ = drives.communicate(timeout=PATIENCE)
+    assert out.count(b"QUICK STOP ACTIVE") == 5
+
+
+def test_mailbox_keeps_the_newest_value():
+    dut = Mailbox(64)
+    other = Mailbox(64, name=dut.name)
+    try:
+        assert other.get() is None
+        for i in range(5):
+            dut.put(i)
+        assert other.get() == (5, 4)
+        with pytest.raises(ValueError, match="holds 64 bytes"):
+            dut.put("x" * 100)
+    finally:
+        other.close()
+        dut.close()
