@@ -28,7 +28,7 @@ class MapConfig:
             as large as the block matcher's, which makes near surfaces grow by half.
         stride: Every so many-th pixel and row is used.
         min_count: Voxels with fewer pixels than this are not given out.
-        ghost_share: Nor are those with less than this share of the pixels, or of the
+        outlier_share: Nor are those with less than this share of the pixels, or of the
             pictures, that the best voxel of the 3 x 3 columns around got.
     """
 
@@ -43,15 +43,17 @@ class MapConfig:
     edge_window: int = 7
     stride: int = 2
     min_count: int = 3
-    ghost_share: float = 0.15
+    outlier_share: float = 0.15
 
     def validate(self) -> None:
         """Raises ValueError for a value out of bounds."""
         check_positive("map", **dataclasses.asdict(self))
         if self.edge_window % 2 == 0:
             raise ValueError(f"map.edge_window must be odd, got {self.edge_window!r}.")
-        if self.ghost_share >= 1.0:
-            raise ValueError(f"map.ghost_share must be < 1, got {self.ghost_share!r}.")
+        if self.outlier_share >= 1.0:
+            raise ValueError(
+                f"map.outlier_share must be < 1, got {self.outlier_share!r}."
+            )
 
 
 @dataclasses.dataclass(kw_only=True)

@@ -11,12 +11,12 @@ import numpy as np
 from painter.camera.frames import CameraFrame
 from painter.camera.reader import CameraHealth, CameraState, Reading
 from painter.canopen.config.bus_file import load_bus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.process.robot_clock import RobotClock
 from painter.canopen.sim.lockstep import LockstepBus
 from painter.canopen.sim.rack import Rack
 from painter.config import Scenario, load_scenario
-from painter.diagrams.hardware_station import Body
+from painter.diagrams.hardware_station import RobotConnection
 from painter.rehearsal.arm_load import ArmLoad
 from painter.rehearsal.sim_world import SimWorld
 from painter.resources import models_path
@@ -62,20 +62,20 @@ class Loop:
 
     def bring_up(self) -> "Loop":
         self.bus.start()
-        while self.bus.report().feedback.phase == Phase.STARTING:
+        while self.bus.report().feedback.phase == BusState.STARTING:
             self.bus.wait_until(self.bus.now() + 0.05)
         report = self.bus.report().feedback
-        assert report.phase == Phase.ENABLED, report.reason
+        assert report.phase == BusState.ENABLED, report.reason
         return self
 
-    def body(self, **changes) -> Body:
-        body = Body(
+    def connection(self, **changes) -> RobotConnection:
+        connection = RobotConnection(
             bus=self.bus,
             clock=RobotClock(),
             cycle=self.rack.bus.cycle,
             read_camera=self._read,
         )
-        return dataclasses.replace(body, **changes)
+        return dataclasses.replace(connection, **changes)
 
     @property
     def trigger(self) -> float:

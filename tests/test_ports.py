@@ -66,11 +66,11 @@ def cycles():
     """Keeps the diagrams alive as long as their systems are looked at."""
     job = load_scenario("blank")
     known = Remainder(segmentation=true_segmentation(job), strokes=())
-    robot = Loop(job, world=False).bring_up().body(read_camera=Reading)
+    robot = Loop(job, world=False).bring_up().connection(read_camera=Reading)
     return (
         MakePaintCycle(job),
         MakePaintCycle(job, remainder=known),
-        MakePaintCycle(job, body=robot),
+        MakePaintCycle(job, connection=robot),
     )
 
 

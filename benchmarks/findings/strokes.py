@@ -20,7 +20,7 @@ from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
 from painter.planning.strokes.raster import plan_strokes, raster_film
 from painter.planning.strokes.stroke_lines import nominal_pitch
-from painter.planning.strokes.stroke_order import link_time, order_strokes
+from painter.planning.strokes.stroke_order import order_strokes, transition_time
 from painter.scene.load import load_scene
 from painter.scene.surface import height_field, is_paintable
 from perception.ground import BoolArray, FloatArray
@@ -94,7 +94,7 @@ def row(mask: BoolArray, height: FloatArray, strokes: tuple[Stroke, ...]) -> str
     for coat in {stroke.coat for stroke in strokes}:
         of_coat = [stroke for stroke in strokes if stroke.coat == coat]
         ordered = order_strokes(of_coat, HOME_T, HOME_T)
-        seconds += link_time(ordered, HOME_T, HOME_T)
+        seconds += transition_time(ordered, HOME_T, HOME_T)
     soiled = f"{100 * np.mean(off >= 0.1):7.1f} %" if off.size else "        -"
     return (
         f"{len(strokes):7d} {seconds:5.0f} s {100 * np.mean(on >= 0.8):5.1f} % "

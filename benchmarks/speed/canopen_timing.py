@@ -20,7 +20,7 @@ import numpy as np
 
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.bus_file import load_bus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import BusProcess, Report
 from painter.canopen.process.realtime import Ticker, lock_memory, stay_awake, use_fifo
@@ -154,9 +154,9 @@ def stream(bus: BusConfig, log: Path) -> Report:
     with BusProcess(bus, log=log) as process:
         process.start()
         while (report := process.report()) is None or (
-            report.feedback.phase != Phase.ENABLED
+            report.feedback.phase != BusState.ENABLED
         ):
-            if report is not None and report.feedback.phase == Phase.STOPPED:
+            if report is not None and report.feedback.phase == BusState.STOPPED:
                 raise SystemExit(f"no bring-up: {report.feedback.reason}")
             time.sleep(0.01)
         q0, start = report.feedback.q, time.monotonic()
@@ -172,7 +172,7 @@ def stream(bus: BusConfig, log: Path) -> Report:
             time.sleep(0.02)
         report = process.report()
         assert report is not None
-        if report.feedback.phase != Phase.ENABLED:
+        if report.feedback.phase != BusState.ENABLED:
             print(f"  stopped: {report.feedback.reason}")
         return report
 

@@ -15,7 +15,7 @@ from painter.camera.reader import CameraReader, camera_opener
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.process.bus_process import BusProcess
-from painter.canopen.process.realtime import prefer
+from painter.canopen.process.realtime import set_niceness
 from painter.canopen.process.robot_clock import RobotClock
 from painter.cli.common import (
     JsonOption,
@@ -32,7 +32,7 @@ from painter.cycle.deploy import DeployCycle
 from painter.cycle.preflight import preflight
 from painter.cycle.step_by_step import StepByStep
 from painter.cycle.write_run import event_watch, write_log
-from painter.diagrams.hardware_station import Body
+from painter.diagrams.hardware_station import RobotConnection
 from painter.errors import BusError, FaultError, InputError, PainterError
 from painter.resources import models_path
 from painter.run.figures.unfinished import rest_of_run
@@ -148,7 +148,7 @@ def deploy(
     bus = bus if camera is None else rehearsed(bus)
     folder = RunFolder.create(out, dump_scenario(job))
     start = time.perf_counter()
-    prefer(_NICENESS)
+    set_niceness(_NICENESS)
     with ExitStack() as stack:
         stopper = stack.enter_context(interruptions())
         log = folder.path / BUS_LOG if log_bus else None
@@ -156,7 +156,7 @@ def deploy(
         reader = stack.enter_context(_camera(job, camera, clock))
         try:
             _check(folder, job, bus, process, reader)
-            body = Body(
+            connection = RobotConnection(
                 bus=process,
                 clock=RobotClock(ahead=ahead),
                 cycle=bus.cycle,
@@ -185,7 +185,7 @@ def deploy(
                 return operator.word(status.phase)
 
             left = DeployCycle(
-                job, body, remainder=remainder, watch=watch, interruption=stopper
+                job, connection, remainder=remainder, watch=watch, interruption=stopper
             )
             # What was found out at the end, such as the stroke to go on with.
             tell(left.end_time, left.status, FollowerStatus())

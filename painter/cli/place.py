@@ -21,7 +21,7 @@ from painter.config import load_scenario
 from painter.errors import InputError
 from painter.planning.arm.placement import propose_distance
 from painter.planning.config import ZoneConfig
-from painter.planning.strokes.facade import plan_stations
+from painter.planning.strokes.facade import plan_base_positions
 from painter.robot.reach_mapper import ReachMapper
 from painter.scene.config import Scene
 from painter.scene.load import load_scene
@@ -86,7 +86,7 @@ def place(
         _DISTANCES.tolist(),
     )
     try:
-        stations = plan_stations(
+        stations = plan_base_positions(
             width,
             height,
             tile=job.tile,

@@ -10,19 +10,18 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 from pydrake.trajectories import PiecewisePolynomial
 
-from painter.canopen.master.feedback import Feedback, Phase
+from painter.canopen.master.feedback import BusState, Feedback
 from painter.canopen.process.robot_clock import RobotClock
 from painter.canopen.process.sample_ring import Samples
 from painter.config import Scenario
 from painter.cycle.cycle_log import CycleLog, GunPoses
 from painter.cycle.simulate import Evaluate, Watch
-from painter.diagrams.hardware_station import Body
+from painter.diagrams.hardware_station import RobotConnection
 from painter.diagrams.paint_cycle import MakePaintCycle, PaintCycleDiagram
 from painter.errors import BusError
 from painter.planning.program.remainder import Remainder
 from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
-from painter.systems.values import CycleStatus, OperatorCommand
-from painter.systems.values import Phase as CyclePhase
+from painter.systems.values import CycleStatus, OperatorCommand, Phase
 from perception.ground import FloatArray
 
 NQ = 5
@@ -40,15 +39,15 @@ _STILL = 1e-6
 class Recorder:
     """What the bus measured over a cycle, and which commands it had."""
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, connection: RobotConnection) -> None:
         """Begins with what is measured from now on."""
-        self._body = body
-        self._last = body.bus.now()
+        self._connection = connection
+        self._last = connection.bus.now()
         self._parts: list[Samples] = []
 
     def take(self) -> None:
         """Takes what is new."""
-        new = self._body.bus.samples(self._last)
+        new = self._connection.bus.samples(self._last)
         if new.time.size:
             self._parts.append(new)
             self._last = float(new.time[-1])
@@ -60,7 +59,7 @@ class Recorder:
 
     def samples(self) -> Samples:
         """Returns all of it."""
-        parts = self._parts or [self._body.bus.samples(self._last)]
+        parts = self._parts or [self._connection.bus.samples(self._last)]
         return Samples(
             time=np.concatenate([part.time for part in parts]),
             q=np.concatenate([part.q for part in parts]),
@@ -71,7 +70,7 @@ class Recorder:
 
 def DeployCycle(
     scenario: Scenario,
-    body: Body,
+    connection: RobotConnection,
     *,
     remainder: Remainder | None = None,
     watch: Watch | None = None,
@@ -81,7 +80,7 @@ def DeployCycle(
 
     Args:
         scenario: The job.
-        body: The robot, with its drives enabled.
+        connection: The robot, with its drives enabled.
         remainder: What is left to do on a wall that was seen before; None = look at
             the wall and paint all of it.
         watch: Called every WATCH_PERIOD as `SimulateCycle` does.
@@ -94,11 +93,11 @@ def DeployCycle(
     Raises:
         BusError: The drives are not enabled.
     """
-    cycle = MakePaintCycle(scenario, body=body, remainder=remainder)
+    cycle = MakePaintCycle(scenario, connection=connection, remainder=remainder)
     builder = DiagramBuilder()
     builder.AddNamedSystem("paint_cycle", cycle.diagram)
     commands = LogVectorOutput(
-        cycle.diagram.GetOutputPort("arm.desired_state"), builder, body.cycle
+        cycle.diagram.GetOutputPort("arm.desired_state"), builder, connection.cycle
     )
     builder.ExportInput(cycle.diagram.GetInputPort("operator"), "operator")
     root = builder.Build()
@@ -106,17 +105,17 @@ def DeployCycle(
     context = simulator.get_mutable_context()
     said = OperatorCommand()
     root.GetInputPort("operator").FixValue(context, said)
-    bus, clock, recorder = body.bus, body.clock, Recorder(body)
+    bus, clock, recorder = connection.bus, connection.clock, Recorder(connection)
     clock.start(bus.now())
     simulator.Initialize()
     strokes: list[tuple[float, float]] = []
     look_image, stop_by = None, np.inf
     steps, time = 0, 0.0
     while True:
-        for _ in range(max(1, round(WATCH_PERIOD / body.cycle))):
+        for _ in range(max(1, round(WATCH_PERIOD / connection.cycle))):
             steps += 1
-            time = steps * body.cycle
-            _Advance(simulator, cycle, body, time)
+            time = steps * connection.cycle
+            _Advance(simulator, cycle, connection, time)
         recorder.take()
         status: CycleStatus = Evaluate(cycle, context, "cycle_status")
         strokes.append((time, status.next_stroke))
@@ -125,7 +124,7 @@ def DeployCycle(
             if word is not None:
                 said = OperatorCommand(number=said.number + 1, word=word)
                 root.GetInputPort("operator").FixValue(context, said)
-        if look_image is None and status.phase == CyclePhase.SCAN:
+        if look_image is None and status.phase == Phase.SCAN:
             look_image = Evaluate(cycle, context, "wall_camera.color_image").data.copy()
         reason = interruption()
         if reason is not None and stop_by == np.inf:
@@ -134,17 +133,22 @@ def DeployCycle(
         if status.finished or time > stop_by:
             break
     # What was commanded is carried out a little later.
-    bus.wait_until(clock.execution(context.get_time()) + 2.0 * body.cycle)
+    bus.wait_until(clock.execution(context.get_time()) + 2.0 * connection.cycle)
     recorder.take()
     log = _MakeLog(
         scenario, cycle, context, status, look_image,
         samples=recorder.samples(), clock=clock, desired=commands.FindLog(context),
     )  # fmt: skip
-    return dataclasses.replace(log, status=_Corrected(body, recorder, strokes, log))
+    return dataclasses.replace(
+        log, status=_Corrected(connection, recorder, strokes, log)
+    )
 
 
 def _Advance(
-    simulator: Simulator, cycle: PaintCycleDiagram, body: Body, time: float
+    simulator: Simulator,
+    cycle: PaintCycleDiagram,
+    connection: RobotConnection,
+    time: float,
 ) -> None:
     """Goes on to a time, one bus cycle on, when the robot's clock comes to it.
 
@@ -152,11 +156,11 @@ def _Advance(
     of a motion that was planned meanwhile are still ahead of their time.
     """
     stood = _Stands(cycle, simulator.get_context())
-    body.bus.wait_until(body.clock.due(time))
+    connection.bus.wait_until(connection.clock.due(time))
     simulator.AdvanceTo(time)
-    now = body.bus.now()
-    if stood and now - body.clock.due(time) > BEHIND:
-        body.clock.hold(time, now)
+    now = connection.bus.now()
+    if stood and now - connection.clock.due(time) > BEHIND:
+        connection.clock.hold(time, now)
 
 
 def _Stands(cycle: PaintCycleDiagram, context: Context) -> bool:
@@ -167,7 +171,7 @@ def _Stands(cycle: PaintCycleDiagram, context: Context) -> bool:
 
 
 def _Corrected(
-    body: Body,
+    connection: RobotConnection,
     recorder: Recorder,
     strokes: list[tuple[float, float]],
     log: CycleLog,
@@ -179,16 +183,16 @@ def _Corrected(
     """
     status, stopped_at = log.status, recorder.last
     try:
-        report = body.bus.report()
+        report = connection.bus.report()
         feedback: Feedback | None = None if report is None else report.feedback
     except BusError:
         feedback = None
     if feedback is not None:
-        if feedback.phase == Phase.ENABLED:
+        if feedback.phase == BusState.ENABLED:
             return status
         stopped_at = feedback.stopped_at
-    stop = body.clock.diagram_time(stopped_at)
-    done = on_course_until(log, stop) - body.clock.ahead
+    stop = connection.clock.diagram_time(stopped_at)
+    done = on_course_until(log, stop) - connection.clock.ahead
     times, numbers = np.array(strokes).T
     number = float(np.interp(done, times, numbers))
     if status.next_stroke == 0.0 or number == status.next_stroke:

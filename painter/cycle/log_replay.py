@@ -10,7 +10,7 @@ from painter.camera.reader import Reading
 from painter.canopen.analysis.log_bus import LogBus
 from painter.canopen.process.robot_clock import RobotClock
 from painter.config import Scenario
-from painter.diagrams.hardware_station import Body, MakeHardwareStation
+from painter.diagrams.hardware_station import MakeHardwareStation, RobotConnection
 from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
 from painter.systems.ports import EvalAs
 from painter.systems.simulated.gun_pose import GunPose
@@ -53,10 +53,10 @@ def ReplayLog(scenario: Scenario, bus: LogBus, cycle: float) -> Replay:
     """
     clock = RobotClock()
     clock.start(bus.begin)
-    body = Body(bus=bus, clock=clock, cycle=cycle, read_camera=Reading)
+    connection = RobotConnection(bus=bus, clock=clock, cycle=cycle, read_camera=Reading)
     kinematics = GetArmKinematics(MakeArmPlant(scenario.directives))
     builder = DiagramBuilder()
-    station = builder.AddSystem(MakeHardwareStation(scenario, body))
+    station = builder.AddSystem(MakeHardwareStation(scenario, connection))
     gun = builder.AddNamedSystem("gun_pose", GunPose(kinematics=kinematics))
     state_port = station.GetOutputPort("arm.state_estimated")
     builder.Connect(state_port, gun.GetInputPort("state"))

@@ -10,7 +10,7 @@ import numpy as np
 
 from painter.camera.reader import CameraState, Reading
 from painter.canopen.config.bus_config import BusConfig
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.process.robot_clock import Bus
 from painter.config import Scenario
 from painter.errors import BusError
@@ -123,11 +123,11 @@ def _check_drives(bus: Bus) -> Check:
             if report is None:
                 continue
             feedback = report.feedback
-            has_begun = has_begun or feedback.phase != Phase.DOWN
-            if feedback.phase == Phase.ENABLED:
+            has_begun = has_begun or feedback.phase != BusState.DOWN
+            if feedback.phase == BusState.ENABLED:
                 axes = ", ".join(axis.name for axis in feedback.axes)
                 return Check("drives", True, f"configured, read back, enabled: {axes}")
-            if feedback.phase == Phase.STOPPED:
+            if feedback.phase == BusState.STOPPED:
                 return Check("drives", False, feedback.reason)
     except BusError as error:
         return Check("drives", False, str(error))

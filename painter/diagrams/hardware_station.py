@@ -1,4 +1,4 @@
-"""The robot's body: CANopen drives and gun, and a depth camera."""
+"""The robot's connection: CANopen drives and gun, and a depth camera."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ CAMERA_PERIOD = 0.02
 
 
 @dataclass(frozen=True)
-class Body:
+class RobotConnection:
     """What a hardware station is connected to.
 
     Attributes:
@@ -34,12 +34,12 @@ class Body:
     gun_off: bool = False
 
 
-def MakeHardwareStation(scenario: Scenario, body: Body) -> Diagram:
+def MakeHardwareStation(scenario: Scenario, connection: RobotConnection) -> Diagram:
     """Makes the robot's station.
 
     Args:
         scenario: Sizes of the camera's pictures.
-        body: What it is connected to.
+        connection: What it is connected to.
 
     Returns:
         A diagram with the ports of `painter.diagrams.station`.
@@ -52,19 +52,22 @@ def MakeHardwareStation(scenario: Scenario, body: Body) -> Diagram:
     arm = builder.AddNamedSystem(
         "canopen_arm",
         CanopenArm(
-            bus=body.bus, clock=body.clock, period=body.cycle, gun_off=body.gun_off
+            bus=connection.bus,
+            clock=connection.clock,
+            period=connection.cycle,
+            gun_off=connection.gun_off,
         ),
     )
     camera = builder.AddNamedSystem(
         "realsense_camera",
         RealsenseCamera(
-            read=body.read_camera,
+            read=connection.read_camera,
             width=config.stereo.width,
             height=config.stereo.height,
             color_width=config.color_width,
             color_height=config.color_height,
             period=CAMERA_PERIOD,
-            diagram_time=body.clock.picture_time,
+            diagram_time=connection.clock.picture_time,
         ),
     )
     builder.Connect(camera.GetOutputPort("status"), arm.GetInputPort("camera_status"))

@@ -13,8 +13,8 @@ from painter.diagrams.station import MakeStation
 from painter.planning.program.remainder import Remainder
 from painter.planning.tile import nominal_tile_pose
 from painter.robot.planners import (
+    MakeFreeMotionPlanner,
     MakeProgramPlanner,
-    MakeTransferPlanner,
 )
 from painter.systems.brain.camera_pose import CameraPose
 from painter.systems.brain.known_result import KnownResult
@@ -35,7 +35,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.values import Wall
 
 if TYPE_CHECKING:  # Simulation runs without the robot's packages.
-    from painter.diagrams.hardware_station import Body
+    from painter.diagrams.hardware_station import RobotConnection
 
 # Inputs and outputs of the brain that meet the station's ports of the same name.
 STATION_TO_BRAIN = (
@@ -50,7 +50,7 @@ JOINT_HISTORY = 4.0
 
 
 def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diagram:
-    """Makes the brain: all that looks, decides and plans, the same on every body.
+    """Makes the brain: all that looks, decides and plans, the same on every connection.
 
     Args:
         scenario: The job.
@@ -93,7 +93,7 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
     mover = add(
         "motion_planner",
         MotionPlanner(
-            planner=MakeTransferPlanner(scenario, planner),
+            planner=MakeFreeMotionPlanner(scenario, planner),
             cell=scenario.segmentation.cell,
             period=period,
         ),
@@ -241,7 +241,7 @@ class PaintCycleDiagram:
 def MakePaintCycle(
     scenario: Scenario,
     *,
-    body: "Body | None" = None,
+    connection: "RobotConnection | None" = None,
     remainder: Remainder | None = None,
     film: FilmState | None = None,
     meshcat: Meshcat | None = None,
@@ -250,14 +250,14 @@ def MakePaintCycle(
 
     Args:
         scenario: The job.
-        body: What the robot's station is connected to; None = a simulated one.
+        connection: What the robot's station is connected to; None = a simulated one.
         remainder: See `MakeBrain`.
         film: What is on the wall already; simulation only. None = nothing.
         meshcat: Where to show it, or None.
     """
     builder = DiagramBuilder()
     station = builder.AddSystem(
-        MakeStation(scenario, body=body, film=film, meshcat=meshcat)
+        MakeStation(scenario, connection=connection, film=film, meshcat=meshcat)
     )
     brain = builder.AddSystem(MakeBrain(scenario, remainder=remainder))
     for name in STATION_TO_BRAIN:

@@ -1,4 +1,4 @@
-"""The station: what the brain sees of a body, whichever body it is."""
+"""The station: what the brain sees of a connection, whichever body it is."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ from painter.diagrams.sim_station import MakeSimStation
 from painter.systems.simulated.paint_film import FilmState
 
 if TYPE_CHECKING:  # Simulation runs without the robot's packages.
-    from painter.diagrams.hardware_station import Body
+    from painter.diagrams.hardware_station import RobotConnection
 
 STATION_INPUTS = frozenset({"arm.desired_state", "gun.trigger"})
 STATION_OUTPUTS = frozenset(
@@ -28,7 +28,7 @@ CHEAT_PREFIX = "cheat."
 def MakeStation(
     scenario: Scenario,
     *,
-    body: "Body | None" = None,
+    connection: "RobotConnection | None" = None,
     film: FilmState | None = None,
     meshcat: Meshcat | None = None,
 ) -> Diagram:
@@ -36,7 +36,7 @@ def MakeStation(
 
     Args:
         scenario: What stands in front of which robot.
-        body: What the robot's station is connected to; None = a simulated one.
+        connection: What the robot's station is connected to; None = a simulated one.
         film: What is on the wall already; simulation only. None = nothing.
         meshcat: Where to show it; simulation only. None = nowhere.
 
@@ -46,12 +46,12 @@ def MakeStation(
     Raises:
         BusError: The robot's drives are not enabled.
     """
-    if body is None:
+    if connection is None:
         station = MakeSimStation(scenario, film=film, meshcat=meshcat)
     else:
         from painter.diagrams.hardware_station import MakeHardwareStation
 
-        station = MakeHardwareStation(scenario, body)
+        station = MakeHardwareStation(scenario, connection)
     CheckPorts(station)
     return station
 

@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from painter.camera.frame_link import FrameServer
-from painter.canopen.process.realtime import prefer
+from painter.canopen.process.realtime import set_niceness
 from painter.canopen.process.sample_ring import SampleRing
 from painter.config import Scenario, dump_scenario, load_scenario
 from painter.errors import PainterError
@@ -170,7 +170,7 @@ def _read(text: str) -> Scenario:
 def _run(scenario: str, ring_name: str, camera: str, pipe: Connection) -> None:
     """The world's process: Ctrl-C is the parent's business."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    prefer(_NICENESS)  # A camera waits for no other program.
+    set_niceness(_NICENESS)  # A camera waits for no other program.
     ring = SampleRing(name=ring_name)
     server = None
     try:

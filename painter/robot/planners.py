@@ -2,7 +2,7 @@
 
 from painter.config import Scenario
 from painter.planning.program.program import ProgramPlanner
-from painter.planning.scan.free_motion import TransferPlanner
+from painter.planning.scan.free_motion import FreeMotionPlanner
 from painter.robot.arm_model import (
     GetArmKinematics,
     GetArmLimits,
@@ -34,16 +34,16 @@ def MakeProgramPlanner(scenario: Scenario) -> ProgramPlanner:
     )
 
 
-def MakeTransferPlanner(
+def MakeFreeMotionPlanner(
     scenario: Scenario, programs: ProgramPlanner
-) -> TransferPlanner:
+) -> FreeMotionPlanner:
     """Makes the planner of motions with the gun closed.
 
     Args:
         scenario: Gives tile and settings.
         programs: Planner of programs for the same robot.
     """
-    return TransferPlanner(
+    return FreeMotionPlanner(
         kinematics=programs.kinematics,
         limits=programs.limits,
         checker=programs.checker,

@@ -14,7 +14,7 @@ from perception.config import SegmentationConfig
 from perception.errors import NoWallError
 from perception.fine_steps.openings import find_openings
 from perception.fine_steps.outlines import straighten
-from perception.fine_steps.steps import Steps, find_steps, sub_cells
+from perception.fine_steps.steps import StepDetection, find_steps, sub_cells
 from perception.fine_steps.unseen import Reason, close_gaps, explain
 from perception.fine_steps.votes import point_votes, wall_share
 from perception.fine_steps.wall_surface import fit_wall_surface
@@ -136,7 +136,7 @@ def _blocks(grid: Grid, split: int) -> Grid:
     return blocks.reshape(ny, nx, split**2)
 
 
-def _mean_residual(steps: Steps, level: BoolArray, split: int) -> FloatArray:
+def _mean_residual(steps: StepDetection, level: BoolArray, split: int) -> FloatArray:
     """Returns each cell's mean residual, m, over the sub-cells that are as it is."""
     residual = _blocks(steps.residual, split)
     known = np.isfinite(residual)
@@ -190,7 +190,7 @@ def _labels(coarse: WallSegmentation, mask: BoolArray, hole: BoolArray) -> IntAr
 
 
 def _confidence(
-    steps: Steps, share: FloatArray, gap: BoolArray, hole: BoolArray, split: int
+    steps: StepDetection, share: FloatArray, gap: BoolArray, hole: BoolArray, split: int
 ) -> FloatArray:
     """Returns how sure each cell's answer is, 0 to 1.
 

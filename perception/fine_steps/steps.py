@@ -49,7 +49,7 @@ class SubCells(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False)
-class Steps(FrozenValue):
+class StepDetection(FrozenValue):
     """Depth against the wall's surface, sub-cell by sub-cell.
 
     Attributes:
@@ -152,7 +152,7 @@ def _cover(front: FloatArray, reach: int) -> FloatArray:
 
 def find_steps(
     cells: SubCells, surface: WallSurface, *, cell: float, config: SegmentationConfig
-) -> Steps:
+) -> StepDetection:
     """Tells what is level with the wall from what is not.
 
     Low steps in strong noise show in the mean over a few sub-cells; such a mean blurs
@@ -177,7 +177,9 @@ def find_steps(
     core = np.abs(mean) > mean_bound
     peak = maximum_filter(np.where(core, np.abs(mean), 0.0), 2 * _WINDOW - 1)
     step |= (peak > 0.0) & (np.abs(mean) > 0.5 * peak) & seen
-    return Steps(residual=residual, sigma=sigma, bound=bound, level=seen & ~step)
+    return StepDetection(
+        residual=residual, sigma=sigma, bound=bound, level=seen & ~step
+    )
 
 
 def _bounds(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from perception.fine_steps.steps import Steps, SubCells
+from perception.fine_steps.steps import StepDetection, SubCells
 from perception.fine_steps.wall_surface import WallSurface
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
@@ -36,7 +36,7 @@ class Votes(FrozenValue):
     weight: FloatArray
 
 
-def point_votes(cells: SubCells, steps: Steps, surface: WallSurface) -> Votes:
+def point_votes(cells: SubCells, steps: StepDetection, surface: WallSurface) -> Votes:
     """Lets each point that is not hidden vote.
 
     Args:

@@ -45,7 +45,7 @@ class FoundPlanes(FrozenValue):
 
 
 @dataclass(frozen=True, eq=False)
-class SegmentationSteps(FrozenValue):
+class SegmentationStages(FrozenValue):
     """Everything between a cloud and its segmentation, for pictures and reports.
 
     Attributes:
@@ -112,7 +112,7 @@ def segment_tile(
     width: float,
     height: float,
     config: SegmentationConfig,
-) -> SegmentationSteps:
+) -> SegmentationStages:
     """Does steps 3 to 6 on the tile of a wall.
 
     Every region of the wall's plane is wall, not the largest alone: a door or a pipe
@@ -161,7 +161,7 @@ def segment_tile(
         X_WT=wall.X_WT,
         cell=config.cell,
     )
-    return SegmentationSteps(
+    return SegmentationStages(
         found=found,
         wall=wall,
         wall_plane=wall_plane,

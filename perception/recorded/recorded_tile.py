@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from perception.fine_steps.unseen import Reason
 from perception.ground import BoolArray, FloatArray, FrozenValue
-from perception.paper_steps.pipeline import SegmentationSteps
+from perception.paper_steps.pipeline import SegmentationStages
 from perception.paper_steps.planes import Plane
 
 # A sensor sees a wall from no farther than so many times the cloud's extent; beyond,
@@ -131,7 +131,7 @@ def fitting_cell(p_TQs: FloatArray, *, least: float) -> float:
     return steps[0] if steps else _CELL_STEPS[-1] * least
 
 
-def clear_feet(steps: SegmentationSteps, *, limit: float) -> SegmentationSteps:
+def clear_feet(steps: SegmentationStages, *, limit: float) -> SegmentationStages:
     """Takes the feet of obstacles out of the mask.
 
     What stands on a wall has sides. Seen at a slant they are narrow strips, too small
@@ -164,7 +164,7 @@ def clear_feet(steps: SegmentationSteps, *, limit: float) -> SegmentationSteps:
     )
 
 
-def close_gaps(steps: SegmentationSteps) -> SegmentationSteps:
+def close_gaps(steps: SegmentationStages) -> SegmentationStages:
     """Adds gaps between points to the mask: unseen, one or two cells wide, in the wall.
 
     Args:
@@ -181,8 +181,8 @@ def close_gaps(steps: SegmentationSteps) -> SegmentationSteps:
 
 
 def set_back_wall(
-    steps: SegmentationSteps, *, set_back: float
-) -> tuple[SegmentationSteps, float]:
+    steps: SegmentationStages, *, set_back: float
+) -> tuple[SegmentationStages, float]:
     """Adds parts of a wall that lie behind its plane, such as dormers, to the mask.
 
     Such a part is a region of a plane parallel to the wall's, up to `set_back` behind

@@ -13,7 +13,7 @@ from perception.fine_steps.refine import refine_segmentation
 from perception.ground import FloatArray, FrozenValue
 from perception.paper_steps.pipeline import (
     FoundPlanes,
-    SegmentationSteps,
+    SegmentationStages,
     find_planes,
     segment_tile,
 )
@@ -53,7 +53,7 @@ class RecordedWall(FrozenValue):
         set_back_area: Of the mask that is wall behind the main plane, m².
     """
 
-    steps: SegmentationSteps
+    steps: SegmentationStages
     side: ViewSide
     inlier_distance: float
     strays: int

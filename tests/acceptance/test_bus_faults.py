@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from painter.canopen.master.feedback import Phase as BusPhase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.sim.rack import Fault
 from painter.cycle.deploy import DeployCycle
 from painter.cycle.true_wall import true_segmentation
@@ -110,7 +110,7 @@ def paint(strike, *, on_watch=lambda loop: None):
     try:
         log = DeployCycle(
             scenario,
-            loop.body(),
+            loop.connection(),
             remainder=remainder,
             watch=lambda *args: on_watch(loop),
         )
@@ -156,7 +156,7 @@ def true_stroke_number(witness, remainder, moment):
 def acknowledge(loop):
     """Acknowledges the stop; returns what the bring-up came to."""
     loop.bus.acknowledge()
-    while (report := loop.bus.report().feedback).phase == BusPhase.STARTING:
+    while (report := loop.bus.report().feedback).phase == BusState.STARTING:
         loop.bus.wait_until(loop.bus.now() + 0.05)
     return report
 
@@ -166,14 +166,14 @@ def go_on(loop, log):
     loop.rack.clear()
     loop.unplugged = False
     loop.bus.wait_until(loop.bus.now() + 0.5)
-    assert loop.bus.report().feedback.phase == BusPhase.STOPPED
+    assert loop.bus.report().feedback.phase == BusState.STOPPED
     report = acknowledge(loop)
-    assert report.phase == BusPhase.ENABLED, report.reason
+    assert report.phase == BusState.ENABLED, report.reason
     scenario, remainder = job()
     rest = strokes_from(remainder.strokes, log.status.next_stroke)
     assert len(rest) == 2
     left = DeployCycle(
-        scenario, loop.body(), remainder=Remainder(remainder.segmentation, rest)
+        scenario, loop.connection(), remainder=Remainder(remainder.segmentation, rest)
     )
     assert left.status.phase == Phase.DONE, left.status.cause
 
@@ -247,7 +247,7 @@ def test_a_drive_that_is_another_after_a_reset_while_painting(fault, cause):
     assert "elbow_pitch: unexpected boot-up" in log.status.cause
     before = witness.q[-1]
     report = acknowledge(loop)
-    assert report.phase == BusPhase.STOPPED
+    assert report.phase == BusState.STOPPED
     assert "elbow_pitch" in report.reason
     assert cause in report.reason
     assert not witness.was_open
@@ -302,7 +302,7 @@ def test_a_stopped_job_goes_on_where_the_gun_closed():
     loop.observers.append(after)
     left = DeployCycle(
         scenario,
-        loop.body(),
+        loop.connection(),
         remainder=Remainder(remainder.segmentation, rest),
     )
     assert left.status.phase == Phase.DONE

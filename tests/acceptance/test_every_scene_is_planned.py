@@ -6,7 +6,7 @@ import pytest
 from painter.config import load_scenario
 from painter.cycle.true_wall import true_segmentation
 from painter.planning.tile import nominal_tile_pose
-from painter.robot.planners import MakeProgramPlanner, MakeTransferPlanner
+from painter.robot.planners import MakeFreeMotionPlanner, MakeProgramPlanner
 
 NAMED = [(name, 1) for name in ("blank", "cubes", "obstacles", "room", "terrace")]
 RANDOM = [("random", seed) for seed in range(1, 21)]
@@ -29,7 +29,7 @@ def test_program_is_whole_and_passes_its_verification(planner, name, seed):
     wall = wall.replace(depth=np.asarray(wall.depth) + noise)
     q = np.deg2rad(job.motion.home_deg)
     for goal, X_WT in (("look", nominal_tile_pose(job.tile)), ("scan", wall.X_WT)):
-        q = MakeTransferPlanner(job, planner).plan(goal, q, X_WT).q[-1]
+        q = MakeFreeMotionPlanner(job, planner).plan(goal, q, X_WT).q[-1]
     # Raises if a limit, a clearance, a stand-off or an angle is not kept.
     program = planner.program(planner.strokes(wall), wall, q)
     left_out = sum(item.stroke.length for item in program.skipped)

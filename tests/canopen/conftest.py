@@ -13,11 +13,11 @@ import pytest
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.master.arm_bus import ArmBus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.sim.rack import Rack
 from painter.canopen.sim.wire import Wire
-from painter.canopen.wire.links import CanLink
+from painter.canopen.wire.links import PythonCanTransport
 from painter.resources import models_path
 
 CHANNEL = os.environ.get("PAINTER_CAN")
@@ -30,11 +30,11 @@ def on_the_interface(monkeypatch):
     if CHANNEL is None:
         yield
         return
-    opened: list[CanLink] = []
+    opened: list[PythonCanTransport] = []
     attach = Wire.attach
 
     def attach_socket(wire, receiver):
-        opened.append(CanLink("socketcan", CHANNEL, 1_000_000))
+        opened.append(PythonCanTransport("socketcan", CHANNEL, 1_000_000))
         vars(wire).setdefault("sockets", []).append(opened[-1])
         return attach(wire, receiver)
 
@@ -94,8 +94,8 @@ class Lab:
 
     def bring_up(self) -> "Lab":
         self.master.start()
-        self.until(lambda: self.master.phase != Phase.STARTING)
-        assert self.master.phase == Phase.ENABLED, self.master.reason
+        self.until(lambda: self.master.phase != BusState.STARTING)
+        assert self.master.phase == BusState.ENABLED, self.master.reason
         return self
 
     def sway(self, amplitude: float = 0.2, period: float = 2.0) -> "Lab":

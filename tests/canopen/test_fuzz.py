@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.protocol.frames import Frame
 from painter.canopen.sim.rack import Rack
 
@@ -74,7 +74,7 @@ def test_frames_that_mean_nothing_change_nothing(lab, total):
     lab.run(0.1)
     counts = lab.master.feedback().statistics
     assert counts.foreign + counts.malformed == count
-    assert lab.master.phase == Phase.ENABLED, lab.master.reason
+    assert lab.master.phase == BusState.ENABLED, lab.master.reason
     np.testing.assert_allclose(positions(lab), before, atol=1.0)
     lab.sway()
     lab.run(1.05)
@@ -93,11 +93,11 @@ def test_forged_feedback_may_stop_the_arm_but_never_move_it(lab, total):
         # actual one: the drives' own speed limit and following error bound that, so it
         # is looked at before it is acknowledged.
         assert moved.max() <= 2.0
-        if lab.master.phase == Phase.STOPPED:
+        if lab.master.phase == BusState.STOPPED:
             stops += 1
             lab.run(0.5)
             lab.master.acknowledge()
-            lab.until(lambda: lab.master.phase != Phase.STARTING)
+            lab.until(lambda: lab.master.phase != BusState.STARTING)
             before = positions(lab)
     assert stops > 0
 

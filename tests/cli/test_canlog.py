@@ -7,7 +7,7 @@ import pytest
 
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.master.arm_bus import ArmBus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.sim.rack import Fault, Rack
 from painter.canopen.wire.candump import LogRecord, format_record
@@ -29,7 +29,7 @@ def log(tmp_path_factory):
     while end is None or cycle * bus.cycle < end:
         now = cycle * bus.cycle
         rack.advance(now)
-        if master.phase == Phase.ENABLED:
+        if master.phase == BusState.ENABLED:
             if end is None:
                 fault_at, end = now + 0.5, now + 0.7
             moved = np.full(5, 0.05 * max(0.0, now - fault_at + 0.5))

@@ -14,7 +14,7 @@ from pydrake.systems.primitives import (
 )
 from pydrake.trajectories import PiecewisePolynomial
 
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.process.robot_clock import RobotClock
 from painter.canopen.sim.rack import Fault
 from painter.config import load_scenario
@@ -57,7 +57,7 @@ def ports(station):
 def test_both_stations_have_the_same_ports(loop):
     scenario = loop.scenario
     simulated = MakeStation(scenario)
-    robot = MakeStation(scenario, body=loop.body(read_camera=blind_reading))
+    robot = MakeStation(scenario, connection=loop.connection(read_camera=blind_reading))
     CheckPorts(robot)
     assert ports(robot) == ports(simulated)
     assert len(ports(robot)) == 7
@@ -85,11 +85,11 @@ def swing(home, seconds=3.0):
 
 
 def test_setpoints_are_carried_out_when_stamped_and_measured_in_time(loop):
-    body = loop.body(read_camera=blind_reading)
+    body = loop.connection(read_camera=blind_reading)
     home = loop.bus.report().feedback.q
     path = swing(home)
     builder = DiagramBuilder()
-    station = builder.AddSystem(MakeStation(loop.scenario, body=body))
+    station = builder.AddSystem(MakeStation(loop.scenario, connection=body))
     source = builder.AddSystem(TrajectorySource(path, 1))
     gun = builder.AddSystem(ConstantVectorSource([0.0]))
     builder.Connect(source.get_output_port(), station.GetInputPort("arm.desired_state"))
@@ -110,11 +110,13 @@ def test_setpoints_are_carried_out_when_stamped_and_measured_in_time(loop):
     # that is due at its own time only 5 ms later. 0.1 rad/s: 10 ms would be 1 mrad.
     expected = path.vector_values(time[late] - body.clock.ahead - 0.005)
     assert np.abs(q[:, late] - expected).max() < 1e-4
-    assert loop.bus.report().feedback.phase == Phase.ENABLED
+    assert loop.bus.report().feedback.phase == BusState.ENABLED
 
 
 def test_a_stop_of_the_bus_is_a_fault_with_its_reason(loop):
-    station = MakeStation(loop.scenario, body=loop.body(read_camera=blind_reading))
+    station = MakeStation(
+        loop.scenario, connection=loop.connection(read_camera=blind_reading)
+    )
     simulator = Simulator(station)
     context = simulator.get_mutable_context()
     home = loop.bus.report().feedback.q
@@ -139,7 +141,9 @@ def test_a_stop_of_the_bus_is_a_fault_with_its_reason(loop):
 def test_drives_must_be_enabled_before_there_is_a_station():
     loop = Loop(load_scenario("blank"), world=False)
     with pytest.raises(BusError, match="not enabled"):
-        MakeStation(loop.scenario, body=loop.body(read_camera=blind_reading))
+        MakeStation(
+            loop.scenario, connection=loop.connection(read_camera=blind_reading)
+        )
 
 
 def test_a_clock_that_is_held_maps_times_on_both_sides():

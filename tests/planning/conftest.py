@@ -10,9 +10,9 @@ from pydrake.planning import CollisionChecker
 from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
 from painter.planning.clearance.obstacles import ClearSpace, ObstacleBox, wall_box
 from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
-from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.gun_path import WallIk
 from painter.planning.motion.joint_motion import planning_limits
-from painter.planning.motion.transitions import Linker
+from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.program.program import ProgramPlanner
 from painter.planning.tile import nominal_tile_pose
 from painter.robot.arm_model import (
@@ -43,12 +43,14 @@ class Robot:
         }
         return ProgramPlanner(**(vars(self) | defaults | settings))
 
-    def linker(self, *boxes: ObstacleBox, X_WT: RigidTransform | None = None) -> Linker:
-        """A linker before the expected wall, with `boxes` on it."""
+    def transitions(
+        self, *boxes: ObstacleBox, X_WT: RigidTransform | None = None
+    ) -> TransitionPlanner:
+        """A transition planner before the expected wall, with `boxes` on it."""
         motion = MotionConfig()
         X_WT = X_WT or nominal_tile_pose(TileConfig())
-        return Linker(
-            gun=SquareGun(self.kinematics, X_WT),
+        return TransitionPlanner(
+            gun=WallIk(self.kinematics, X_WT),
             limits=planning_limits(self.limits, motion.limit_share),
             space=ClearSpace(
                 self.checker,

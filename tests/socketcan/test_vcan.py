@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 
 from painter.canopen.config.bus_file import load_bus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import BusProcess
 from painter.canopen.protocol.frames import ERROR_BUS_OFF, SYNC_ID, Frame
 from painter.canopen.wire.candump import read_log
-from painter.canopen.wire.links import CanLink, LinkError
+from painter.canopen.wire.links import PythonCanTransport, TransportError
 from painter.resources import models_path
 
 CHANNEL = os.environ.get("PAINTER_CAN")
@@ -89,7 +89,7 @@ def drives(bus):
 def enabled(bus, drives, tmp_path):
     with BusProcess(bus, log=tmp_path / "bus.log") as process:
         process.start()
-        wait_for(phase_is(process, Phase.ENABLED), "not enabled")
+        wait_for(phase_is(process, BusState.ENABLED), "not enabled")
         yield process
 
 
@@ -110,17 +110,17 @@ def move(process, goal):
 def test_the_arm_is_enabled_moves_and_stops(enabled):
     goal = np.array([0.1, 0.1, 0.1, 0.1, -0.1])
     move(enabled, goal)
-    assert enabled.report().feedback.phase == Phase.ENABLED
+    assert enabled.report().feedback.phase == BusState.ENABLED
     enabled.stop("a test says so.")
-    wait_for(phase_is(enabled, Phase.STOPPED), "not stopped")
+    wait_for(phase_is(enabled, BusState.STOPPED), "not stopped")
     enabled.acknowledge()
-    wait_for(phase_is(enabled, Phase.ENABLED), "not enabled again")
+    wait_for(phase_is(enabled, BusState.ENABLED), "not enabled again")
     move(enabled, np.zeros(5))
 
 
 def test_bus_off_stops_the_arm_and_an_acknowledgement_starts_it(enabled, tmp_path):
     send_raw(ERROR_FLAG | ERROR_BUS_OFF)
-    report = wait_for(phase_is(enabled, Phase.STOPPED), "not stopped")
+    report = wait_for(phase_is(enabled, BusState.STOPPED), "not stopped")
     assert "bus-off" in report.feedback.reason
     recover(enabled)
     move(enabled, np.full(5, 0.05))
@@ -136,7 +136,7 @@ def test_bus_off_stops_the_arm_and_an_acknowledgement_starts_it(enabled, tmp_pat
 def test_a_link_that_goes_down_stops_the_arm_until_it_is_back(enabled, drives):
     set_link("down")
     try:
-        report = wait_for(phase_is(enabled, Phase.STOPPED), "not stopped")
+        report = wait_for(phase_is(enabled, BusState.STOPPED), "not stopped")
         assert "bus lost" in report.feedback.reason
         enabled.acknowledge()
         refusal = wait_for(lambda: enabled.report().refusal, "not refused")
@@ -156,23 +156,23 @@ def recover(process):
         report = process.report()
         feedback = report.feedback
         seen.append((feedback.phase, feedback.reason, report.refusal))
-        if feedback.phase == Phase.STOPPED:
+        if feedback.phase == BusState.STOPPED:
             process.acknowledge()
             time.sleep(0.5)
-        return feedback.phase == Phase.ENABLED
+        return feedback.phase == BusState.ENABLED
 
     wait_for(is_enabled, seen)
 
 
 def test_a_link_reports_errors_and_opens_again():
-    dut, other = (CanLink("socketcan", CHANNEL, 1_000_000) for _ in range(2))
+    dut, other = (PythonCanTransport("socketcan", CHANNEL, 1_000_000) for _ in range(2))
     other.send(Frame(0x123, b"abc"))
     assert dut.receive(5.0) == [Frame(0x123, b"abc")]
     send_raw(ERROR_FLAG | ERROR_BUS_OFF)
     assert dut.receive(5.0) == [Frame(ERROR_BUS_OFF, bytes(8), is_error=True)]
     set_link("down")
     try:
-        with pytest.raises(LinkError):
+        with pytest.raises(TransportError):
             for _ in range(100):
                 dut.send(Frame(0x80))
                 dut.receive(0.01)
@@ -184,8 +184,8 @@ def test_a_link_reports_errors_and_opens_again():
     assert dut.receive(5.0) == [Frame(0x124)]
     dut.close()
     other.close()
-    with pytest.raises(LinkError, match="can99"):
-        CanLink("socketcan", "can99", 1_000_000)
+    with pytest.raises(TransportError, match="can99"):
+        PythonCanTransport("socketcan", "can99", 1_000_000)
 
 
 @pytest.mark.skipif(shutil.which("candump") is None, reason="needs can-utils")
@@ -195,7 +195,7 @@ def test_logs_of_candump_itself_are_read(tmp_path):
         peer = subprocess.Popen(
             ["candump", "-L", f"{CHANNEL},0:0,#FFFFFFFF"], stdout=out
         )
-        link = CanLink("socketcan", CHANNEL, 1_000_000)
+        link = PythonCanTransport("socketcan", CHANNEL, 1_000_000)
         sent = [Frame(SYNC_ID), Frame(0x185, bytes(range(8)))]
         wait_for(lambda: _passes(link, log), "candump does not start")
         for frame in sent:

@@ -10,7 +10,7 @@ import numpy as np
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.units import AXES, joints_from_axes
 from painter.canopen.master.drive_client import DriveClient
-from painter.canopen.master.feedback import Feedback, Phase, Statistics
+from painter.canopen.master.feedback import BusState, Feedback, Statistics
 from painter.canopen.master.io_client import IoClient
 from painter.canopen.master.node_client import NodeClient
 from painter.canopen.master.setpoints import Setpoint
@@ -41,7 +41,7 @@ class LogBus:
             listener.take(record)
         self._feedbacks = listener.feedbacks
         self._times = np.array([feedback.time for feedback in self._feedbacks])
-        enabled = [f.time for f in self._feedbacks if f.phase == Phase.ENABLED]
+        enabled = [f.time for f in self._feedbacks if f.phase == BusState.ENABLED]
         if not enabled:
             raise InputError("the log holds no time at which all drives are enabled.")
         self.begin, self.end = enabled[0], float(self._times[-1])
@@ -102,7 +102,7 @@ class _Listener:
         self._nodes = nodes
         self._valve = 1 << bus.io.valve_bit
         self._full_flow = bus.io.flow_full_scale
-        self._phase, self._reason, self._stopped_at = Phase.STARTING, "", 0.0
+        self._phase, self._reason, self._stopped_at = BusState.STARTING, "", 0.0
         # Drives go on saying that they are enabled for a cycle after a stop.
         self._has_left = True
         # What the drives answer to a SYNC was measured at it.
@@ -125,9 +125,9 @@ class _Listener:
         if frame.cob_id == RPDO_BASES[0] + node.node_id:
             self._take_command(node, frame.data)
         elif frame.cob_id >= SYNC_ID:
-            node.is_configured = self._phase == Phase.ENABLED
+            node.is_configured = self._phase == BusState.ENABLED
             node.take(frame, now)
-            if node.alarm is not None and self._phase == Phase.ENABLED:
+            if node.alarm is not None and self._phase == BusState.ENABLED:
                 self._stop(node.alarm, now)
             node.alarm = None
 
@@ -142,7 +142,7 @@ class _Listener:
 
     def _stop(self, reason: str, now: float) -> None:
         if not self._reason:
-            self._phase, self._reason, self._stopped_at = Phase.STOPPED, reason, now
+            self._phase, self._reason, self._stopped_at = BusState.STOPPED, reason, now
             self._has_left = False
 
     def _note(self, time: float) -> None:
@@ -175,10 +175,10 @@ class _Listener:
         is_told = all(
             command_of(d.controlword) == Command.ENABLE_OPERATION for d in self._drives
         )
-        if self._phase != Phase.ENABLED:
+        if self._phase != BusState.ENABLED:
             self._has_left |= not (is_enabled and is_told)
             if is_enabled and is_told and self._has_left:
-                self._phase, self._reason, self._stopped_at = Phase.ENABLED, "", 0.0
+                self._phase, self._reason, self._stopped_at = BusState.ENABLED, "", 0.0
             return
         complaints = [d.complaint(must_be_enabled=True) for d in self._drives]
         if not is_told:

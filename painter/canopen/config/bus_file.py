@@ -36,7 +36,7 @@ def load_bus(path: Path) -> BusConfig:
     except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
         raise InputError(f"{path}: {' '.join(str(error).split())}") from error
     for name in AXES:
-        refusal = refuse(bus.drives[name], bus.device(name))
+        refusal = mode_problem(bus.drives[name], bus.device(name))
         if refusal:
             raise InputError(f"{path}: drives.{name}.{refusal}")
     return bus
@@ -55,7 +55,7 @@ def choose_mode(device: DeviceDescription) -> Mode | None:
     return None
 
 
-def refuse(drive: DriveConfig, device: DeviceDescription) -> str | None:
+def mode_problem(drive: DriveConfig, device: DeviceDescription) -> str | None:
     """Returns why a drive with this description cannot be used so, or None.
 
     The text begins with the field of the bus file that asks for it.

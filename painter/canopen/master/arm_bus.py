@@ -13,10 +13,15 @@ import numpy as np
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.units import AXES, axes_from_joints, joints_from_axes
 from painter.canopen.master.drive_client import DriveClient
-from painter.canopen.master.feedback import Feedback, Phase, Statistics
+from painter.canopen.master.feedback import BusState, Feedback, Statistics
 from painter.canopen.master.follower import SetpointFollower
 from painter.canopen.master.io_client import IoClient
-from painter.canopen.master.node_client import OPERATIONAL, NodeClient, Script, together
+from painter.canopen.master.node_client import (
+    OPERATIONAL,
+    NodeClient,
+    Script,
+    run_concurrently,
+)
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.master.watch import LoadMeter, first_complaint
 from painter.canopen.protocol.cia402 import Command
@@ -27,7 +32,7 @@ from painter.canopen.protocol.frames import (
     Frame,
     frame_time,
 )
-from painter.canopen.wire.links import Link, LinkError
+from painter.canopen.wire.links import CanTransport, TransportError
 from painter.errors import BusError
 from perception.ground import FloatArray
 
@@ -38,7 +43,7 @@ _REOPEN_EVERY = 0.25
 class ArmBus:
     """Brings nodes up, streams setpoints, watches, stops."""
 
-    def __init__(self, bus: BusConfig, link: Link) -> None:
+    def __init__(self, bus: BusConfig, link: CanTransport) -> None:
         """Creates the master; nothing is sent yet.
 
         Args:
@@ -64,7 +69,7 @@ class ArmBus:
             timeout=bus.timeouts.setpoint,
             sync_time=frame_time(0, bus.bitrate),
         )
-        self.phase = Phase.DOWN
+        self.phase = BusState.DOWN
         self.reason = ""
         self._stopped_at = 0.0
         # Called right before each SYNC, to take its time.
@@ -107,7 +112,7 @@ class ArmBus:
         Raises:
             BusError: Nothing is latched, or the cause is still there; names it.
         """
-        if self.phase != Phase.STOPPED:
+        if self.phase != BusState.STOPPED:
             raise BusError(f"nothing to acknowledge: the bus is {self.phase}.")
         if self._is_lost:
             raise BusError(f"cannot acknowledge, the bus is still lost: {self.reason}")
@@ -125,7 +130,7 @@ class ArmBus:
         Raises:
             ValueError: They are not in order of time, or not finite.
         """
-        if self.phase != Phase.ENABLED:
+        if self.phase != BusState.ENABLED:
             return
         self._follower.push(points)
 
@@ -140,22 +145,22 @@ class ArmBus:
         if not self.reason:
             self.reason, self._stopped_at = reason, self._now
             _LOGGER.warning("stopped: %s", reason)
-        self.phase = Phase.STOPPED
+        self.phase = BusState.STOPPED
         if self._script is not None:
             self._script.close()
             self._script = None
-        if quick or was not in (Phase.ENABLED, Phase.STOPPED):
+        if quick or was not in (BusState.ENABLED, BusState.STOPPED):
             self._follower.release()
             for drive in self.drives:
                 drive.controlword = Command.QUICK_STOP
                 drive.target = drive.position
-        elif was == Phase.ENABLED:
+        elif was == BusState.ENABLED:
             self._follower.brake(self._now)
         self._send_outputs()
 
     def shut_down(self) -> None:
         """Begins to switch off: ramp, brakes, power."""
-        if self.phase in (Phase.ENABLED, Phase.STARTING):
+        if self.phase in (BusState.ENABLED, BusState.STARTING):
             self.stop("switched off.")
         self._begin(self._switch_off(self._now + self._follower.braking_time))
 
@@ -196,13 +201,13 @@ class ArmBus:
         else:
             try:
                 frames = self._link.receive(timeout)
-            except LinkError as error:
+            except TransportError as error:
                 self._lose(f"bus lost: {error}")
         for frame in frames:
             self._take(frame, now)
         if self._is_lost:
             return
-        if self.phase != Phase.DOWN and now >= self._next_heartbeat:
+        if self.phase != BusState.DOWN and now >= self._next_heartbeat:
             self._next_heartbeat = now + self._bus.timeouts.heartbeat / 3.0
             state = bytes([OPERATIONAL])
             self._send(Frame(HEARTBEAT_BASE + self._bus.master_id, state))
@@ -239,7 +244,7 @@ class ArmBus:
     def _begin(self, script: Script) -> None:
         if self._script is not None:
             self._script.close()
-        self.phase = Phase.STARTING
+        self.phase = BusState.STARTING
         self._script = script
 
     def _advance_script(self) -> None:
@@ -256,7 +261,7 @@ class ArmBus:
     def _start_up(self, nodes: Sequence[NodeClient]) -> Script:
         if nodes:
             self._is_cyclic = False  # No SYNC while PDOs are mapped.
-            yield from together([node.bring_up() for node in nodes])
+            yield from run_concurrently([node.bring_up() for node in nodes])
         for node in self.nodes:
             node.got_tpdo, node.missed, node.alarm = False, 0, None
             node.start()
@@ -264,7 +269,7 @@ class ArmBus:
             drive.forget_owed()
         self._is_cyclic = True
         timeout = self._bus.timeouts.boot
-        yield from together(
+        yield from run_concurrently(
             node.wait(
                 lambda node=node: node.got_tpdo and node.nmt == OPERATIONAL,  # type: ignore[misc]
                 timeout,
@@ -274,11 +279,11 @@ class ArmBus:
         )
         if not self.io.is_chain_closed:
             raise BusError("e-stop: the chain is open.")
-        yield from together([drive.enable() for drive in self.drives])
+        yield from run_concurrently([drive.enable() for drive in self.drives])
         for drive in self.drives:
             yield from drive.home()
         self._follower.stand(self._actual()[0])
-        self.phase = Phase.ENABLED
+        self.phase = BusState.ENABLED
 
     def _switch_off(self, standing: float) -> Script:
         """Waits until the arm stands, at a time, s; then brakes and power."""
@@ -287,16 +292,16 @@ class ArmBus:
             yield
         self._follower.release()
         if self._is_cyclic:
-            yield from together([drive.disable() for drive in self.drives])
+            yield from run_concurrently([drive.disable() for drive in self.drives])
         self._is_cyclic = False
-        self.phase = Phase.DOWN
+        self.phase = BusState.DOWN
 
     # The cycle's parts.
 
     def _follow(self, now: float) -> None:
         """Takes the command of this cycle to the drives."""
         follower = self._follower
-        if self.phase != Phase.ENABLED and not follower.is_braking:
+        if self.phase != BusState.ENABLED and not follower.is_braking:
             return
         problem = follower.step(now)
         if problem is not None:
@@ -330,7 +335,7 @@ class ArmBus:
         if self._counts["cycles"] > 0:
             self._counts["missing"] += came.count(False)
         # Scripts that wait for a new one clear the flag themselves.
-        if self.phase != Phase.STARTING:
+        if self.phase != BusState.STARTING:
             for drive in self.drives:
                 drive.got_tpdo = False
 
@@ -340,11 +345,14 @@ class ArmBus:
         for node in self.nodes:
             if node.alarm is not None and self._is_cyclic:
                 alarm, node.alarm = node.alarm, None
-                if self.phase != Phase.STARTING or not node.is_configured:
+                if self.phase != BusState.STARTING or not node.is_configured:
                     self.stop(alarm, quick=True)
-        if self.phase not in (Phase.ENABLED, Phase.STOPPED) or not self._is_cyclic:
+        if (
+            self.phase not in (BusState.ENABLED, BusState.STOPPED)
+            or not self._is_cyclic
+        ):
             return
-        held = self.phase == Phase.ENABLED or self._follower.is_braking
+        held = self.phase == BusState.ENABLED or self._follower.is_braking
         complaint = first_complaint(
             self._bus, self.drives, self.io, now=now, must_be_enabled=held
         )
@@ -371,7 +379,7 @@ class ArmBus:
         self._meter.note(frame, self._now)
         try:
             self._link.send(frame)
-        except LinkError as error:
+        except TransportError as error:
             self._lose(f"bus lost: {error}")
 
     def _lose(self, reason: str) -> None:
@@ -385,7 +393,7 @@ class ArmBus:
         self._reopen_at = now + _REOPEN_EVERY
         try:
             self._link.reopen()
-        except LinkError as error:
+        except TransportError as error:
             _LOGGER.debug("still lost: %s", error)
             return
         _LOGGER.warning("the bus is back; the stop stays until it is acknowledged.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from perception.ground import FloatArray
 
 
-class Phase(enum.StrEnum):
+class BusState(enum.StrEnum):
     """What the bus as a whole does."""
 
     DOWN = "down"  # Not started, or switched off.
@@ -79,7 +79,7 @@ class Feedback:
     """
 
     time: float
-    phase: Phase
+    phase: BusState
     reason: str
     stopped_at: float
     q: FloatArray

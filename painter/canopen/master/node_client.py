@@ -222,7 +222,7 @@ class NodeClient:
             self.alarm = f"{self.name}: {self.fault_text()}."
 
 
-def together(scripts: Iterable[Script]) -> Script:
+def run_concurrently(scripts: Iterable[Script]) -> Script:
     """Runs scripts side by side until all have ended; the first error ends all."""
     running = list(scripts)
     while running:

@@ -22,20 +22,20 @@ from types import TracebackType
 
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.master.arm_bus import ArmBus
-from painter.canopen.master.feedback import Feedback, Phase
+from painter.canopen.master.feedback import BusState, Feedback
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.mailbox import Mailbox
 from painter.canopen.process.realtime import (
     Lateness,
     Ticker,
+    freeze_gc,
     lock_memory,
-    settle_memory,
     stay_awake,
     use_fifo,
 )
 from painter.canopen.process.sample_ring import SampleRing, Samples
-from painter.canopen.wire.frame_log import FrameLogger, TappedLink
-from painter.canopen.wire.links import Link, open_link
+from painter.canopen.wire.frame_log import FrameLogger, TappedTransport
+from painter.canopen.wire.links import CanTransport, open_transport
 from painter.errors import BusError, PainterError
 from painter.timebase import TimeBase
 
@@ -89,8 +89,10 @@ class BusLoop:
             PainterError: The link cannot be opened, or an EDS not be used.
         """
         self._clock = clock or TimeBase()
-        link = open_link(bus)
-        self._link: Link = link if log is None else TappedLink(link, log, self._clock)
+        link = open_transport(bus)
+        self._link: CanTransport = (
+            link if log is None else TappedTransport(link, log, self._clock)
+        )
         self._master = ArmBus(bus, self._link)
         self._commands = commands
         self._mailbox = mailbox
@@ -105,7 +107,7 @@ class BusLoop:
     def run(self) -> None:
         """Runs until the other side asks to end, or is gone, and the arm is off."""
         self._is_fifo = use_fifo()
-        settle_memory()
+        freeze_gc()
         lock_memory()
         with stay_awake():
             self._cycle_until_ended()
@@ -146,7 +148,7 @@ class BusLoop:
     def _has_ended(self) -> bool:
         if self._end_at is None:
             return False
-        is_off = self._master.phase in (Phase.DOWN, Phase.STOPPED)
+        is_off = self._master.phase in (BusState.DOWN, BusState.STOPPED)
         return (is_off and self._master.is_idle) or self._clock.now() > self._end_at
 
     def _take_commands(self) -> None:

@@ -89,7 +89,7 @@ def stay_awake() -> Iterator[bool]:
         os.close(file)
 
 
-def prefer(niceness: int) -> None:
+def set_niceness(niceness: int) -> None:
     """Puts this process, and those it starts, before others; where allowed.
 
     Args:
@@ -155,7 +155,7 @@ class Ticker:
         return Lateness(self._count, p50, p99, p999, float(late.max()))
 
 
-def settle_memory() -> None:
+def freeze_gc() -> None:
     """Leaves what was imported out of garbage collection, which takes 20 ms."""
     gc.collect()
     gc.freeze()

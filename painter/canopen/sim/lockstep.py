@@ -9,7 +9,7 @@ from collections import deque
 import numpy as np
 
 from painter.canopen.master.arm_bus import ArmBus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import Report
 from painter.canopen.process.sample_ring import Samples
@@ -84,7 +84,7 @@ class LockstepBus:
             return
         self.master.shut_down()
         end = self.now() + _SWITCH_OFF_TIME
-        while self.master.phase != Phase.DOWN and self.now() < end:
+        while self.master.phase != BusState.DOWN and self.now() < end:
             self._step()
 
     def _step(self) -> None:

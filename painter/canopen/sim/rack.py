@@ -15,7 +15,7 @@ from painter.canopen.sim.load import Load
 from painter.canopen.sim.motor import LoadedMotor
 from painter.canopen.sim.node import Nmt, SimNode
 from painter.canopen.sim.wire import Wire
-from painter.canopen.wire.links import LinkError
+from painter.canopen.wire.links import TransportError
 
 STEP = 0.001
 
@@ -64,7 +64,7 @@ class Rack:
                     drive.store.fix(0x1018, sub, wanted)
             self.drives[name] = drive
         self.io = SimIo(bus.io.node_id, self.wire)
-        self.link = WireLink(self)
+        self.link = WireTransport(self)
         self.now = 0.0
         # Called after each step of 1 ms.
         self.stepped: Callable[[], None] = lambda: None
@@ -179,7 +179,7 @@ class Rack:
         self.link.is_down = False
 
 
-class WireLink:
+class WireTransport:
     """The master's port on the wire of a rack, in the same thread."""
 
     def __init__(self, rack: Rack) -> None:
@@ -194,7 +194,7 @@ class WireLink:
         """Sends now; a controller that is bus-off loses it.
 
         Raises:
-            LinkError: The adapter is unplugged.
+            TransportError: The adapter is unplugged.
         """
         self._check()
         if not self._is_off:
@@ -204,7 +204,7 @@ class WireLink:
         """Returns what came; simulated time does not pass in here.
 
         Raises:
-            LinkError: The adapter is unplugged.
+            TransportError: The adapter is unplugged.
         """
         self._check()
         frames = list(self._frames)
@@ -215,7 +215,7 @@ class WireLink:
         """Starts the controller again.
 
         Raises:
-            LinkError: The adapter is unplugged.
+            TransportError: The adapter is unplugged.
         """
         self._check()
         self._is_off = False
@@ -235,4 +235,4 @@ class WireLink:
 
     def _check(self) -> None:
         if self.is_down:
-            raise LinkError("the CAN interface is down.")
+            raise TransportError("the CAN interface is down.")

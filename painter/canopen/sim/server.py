@@ -9,14 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from painter.canopen.config.bus_config import BusConfig
-from painter.canopen.process.realtime import settle_memory
+from painter.canopen.process.realtime import freeze_gc
 from painter.canopen.protocol.frames import SYNC_ID, Frame
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.rack import STEP, Rack
 from painter.canopen.wire.links import (
-    Link,
-    LinkError,
-    open_link,
+    CanTransport,
+    TransportError,
+    open_transport,
     pack_frame,
     unpack_frame,
 )
@@ -32,13 +32,13 @@ _CREEP = 0.0001
 
 
 class LocalHub:
-    """Listens on a local socket and joins all who connect on one wire; a `Link`."""
+    """Listens on a local socket and joins all clients on one wire; a `CanTransport`."""
 
     def __init__(self, path: str) -> None:
         """Listens.
 
         Raises:
-            LinkError: The path cannot be used.
+            TransportError: The path cannot be used.
         """
         self._path = Path(path)
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -49,7 +49,7 @@ class LocalHub:
             self._listener.bind(path)
         except OSError as error:
             self._listener.close()
-            raise LinkError(f"local {path}: {error.strerror}.") from error
+            raise TransportError(f"local {path}: {error.strerror}.") from error
         self._listener.listen()
         self._clients: list[socket.socket] = []
 
@@ -137,11 +137,11 @@ class RackServer:
             clock: The run's; None = the machine's.
 
         Raises:
-            LinkError: The link cannot be opened.
+            TransportError: The link cannot be opened.
         """
         self.rack = Rack(bus, load)
-        self._link: Link = (
-            LocalHub(bus.channel) if bus.interface == "local" else open_link(bus)
+        self._link: CanTransport = (
+            LocalHub(bus.channel) if bus.interface == "local" else open_transport(bus)
         )
         self._send = self.rack.wire.attach(self._to_link)
         self._clock = clock or TimeBase()
@@ -155,7 +155,7 @@ class RackServer:
 
     def run(self, is_done: Callable[[float], bool]) -> None:
         """Runs until `is_done`, which is asked about every ms with the rack's time."""
-        settle_memory()
+        freeze_gc()
         while not is_done(self.rack.now):
             self._serve()
 
@@ -205,9 +205,9 @@ class RackServer:
     def _receive(self, wait: float) -> list[Frame]:
         try:
             return self._link.receive(wait)
-        except LinkError:
+        except TransportError:
             self._clock.sleep(STEP)
-            with contextlib.suppress(LinkError):
+            with contextlib.suppress(TransportError):
                 self._link.reopen()
         return []
 
@@ -236,5 +236,5 @@ class RackServer:
         return when
 
     def _to_link(self, frame: Frame, now: float) -> None:
-        with contextlib.suppress(LinkError):
+        with contextlib.suppress(TransportError):
             self._link.send(frame)

@@ -1,9 +1,9 @@
 """Writes what passes on the bus to a log, without holding up the bus.
 
-`TappedLink` stands before a link and puts copies of all frames into a pipe; a process
-of its own, below everything else, makes text of them. The bus process never waits: a
-pipe that is full loses frames of the log, and the log's writer says how many. When the
-bus process dies, what it sent before is in the log.
+`TappedTransport` stands before a link and puts copies of all frames into a pipe; a
+process of its own, below everything else, makes text of them. The bus process never
+waits: a pipe that is full loses frames of the log, and the log's writer says how many.
+When the bus process dies, what it sent before is in the log.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from pathlib import Path
 
 from painter.canopen.protocol.frames import Frame
 from painter.canopen.wire.candump import LogRecord, format_record
-from painter.canopen.wire.links import Link
+from painter.canopen.wire.links import CanTransport
 from painter.errors import InputError
 from painter.timebase import TimeBase
 
@@ -36,11 +36,11 @@ _FLUSH_EVERY = 0.5
 _END_TIME = 60.0  # s; on a machine that works on other things.
 
 
-class TappedLink:
+class TappedTransport:
     """A link whose frames are copied into a pipe."""
 
     def __init__(
-        self, link: Link, pipe: Connection, clock: TimeBase | None = None
+        self, link: CanTransport, pipe: Connection, clock: TimeBase | None = None
     ) -> None:
         """Stands before a link.
 
@@ -59,12 +59,12 @@ class TappedLink:
         self._lost = 0
 
     def send(self, frame: Frame) -> None:
-        """Sends a frame; raises LinkError when the way is lost."""
+        """Sends a frame; raises TransportError when the way is lost."""
         self._link.send(frame)
         self._note(frame, _SENT)
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns frames that came; raises LinkError when the way is lost."""
+        """Returns frames that came; raises TransportError when the way is lost."""
         if timeout > 0.0 or len(self._pending) >= _MOST_AT_ONCE:
             self._flush()
         frames = self._link.receive(timeout)
@@ -73,7 +73,7 @@ class TappedLink:
         return frames
 
     def reopen(self) -> None:
-        """Opens the way again; raises LinkError when it cannot be."""
+        """Opens the way again; raises TransportError when it cannot be."""
         self._link.reopen()
 
     def close(self) -> None:

@@ -20,45 +20,45 @@ _MOST_AT_ONCE = 256
 T = TypeVar("T")
 
 
-class LinkError(BusError):
+class TransportError(BusError):
     """The way to the bus is lost; it may be opened again."""
 
 
-class Link(Protocol):
+class CanTransport(Protocol):
     """A way to a bus, for one thread."""
 
     def send(self, frame: Frame) -> None:
-        """Sends a frame; raises LinkError when the way is lost."""
+        """Sends a frame; raises TransportError when the way is lost."""
 
     def receive(self, timeout: float) -> list[Frame]:
         """Returns frames that came; waits up to `timeout` s for the first one."""
 
     def reopen(self) -> None:
-        """Opens the way again; raises LinkError when it cannot be."""
+        """Opens the way again; raises TransportError when it cannot be."""
 
     def close(self) -> None:
         """Gives the way up."""
 
 
-def open_link(bus: BusConfig) -> Link:
+def open_transport(bus: BusConfig) -> CanTransport:
     """Opens the interface and channel that a bus file names.
 
     Raises:
-        LinkError: It cannot be opened; names both.
+        TransportError: It cannot be opened; names both.
     """
     if bus.interface == "local":
-        return LocalLink(bus.channel)
-    return CanLink(bus.interface, bus.channel, bus.bitrate)
+        return LocalTransport(bus.channel)
+    return PythonCanTransport(bus.interface, bus.channel, bus.bitrate)
 
 
-class CanLink:
+class PythonCanTransport:
     """A python-can interface."""
 
     def __init__(self, interface: str, channel: str, bitrate: int) -> None:
         """Opens it.
 
         Raises:
-            LinkError: It cannot be opened.
+            TransportError: It cannot be opened.
         """
         self._options = (interface, channel, bitrate)
         self._bus: can.BusABC | None = None
@@ -82,12 +82,12 @@ class CanLink:
             )
         except (can.CanError, OSError, ValueError, ImportError) as error:
             text = " ".join(str(error).split())
-            raise LinkError(f"{interface} {channel}: {text}") from error
+            raise TransportError(f"{interface} {channel}: {text}") from error
 
     def send(self, frame: Frame) -> None:
         """Sends a frame."""
         if self._bus is None:
-            raise LinkError("the CAN interface is closed.")
+            raise TransportError("the CAN interface is closed.")
         if self._echoes:
             self._own = [*self._own[-255:], (frame.cob_id, frame.data)]
         message = can.Message(
@@ -96,12 +96,12 @@ class CanLink:
         try:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
-            raise LinkError(f"sending failed: {error}") from error
+            raise TransportError(f"sending failed: {error}") from error
 
     def receive(self, timeout: float) -> list[Frame]:
         """Returns frames that came; waits up to `timeout` s for the first one."""
         if self._bus is None:
-            raise LinkError("the CAN interface is closed.")
+            raise TransportError("the CAN interface is closed.")
         frames: list[Frame] = []
         try:
             message = self._bus.recv(timeout)
@@ -111,7 +111,7 @@ class CanLink:
             if message is not None:
                 self._take(message, frames)
         except (can.CanError, OSError) as error:
-            raise LinkError(f"receiving failed: {error}") from error
+            raise TransportError(f"receiving failed: {error}") from error
         return frames
 
     def close(self) -> None:
@@ -147,14 +147,14 @@ def unpack_frame(packet: bytes) -> Frame | None:
     return Frame(cob_id, data[:length])
 
 
-class LocalLink:
+class LocalTransport:
     """A lossless socket to `painter drives` on this machine."""
 
     def __init__(self, path: str) -> None:
         """Connects.
 
         Raises:
-            LinkError: Nobody listens there.
+            TransportError: Nobody listens there.
         """
         self._path = path
         self._socket: socket.socket | None = None
@@ -168,7 +168,7 @@ class LocalLink:
             link.connect(self._path)
         except OSError as error:
             link.close()
-            raise LinkError(f"local {self._path}: {error.strerror}.") from error
+            raise TransportError(f"local {self._path}: {error.strerror}.") from error
         self._socket = link
 
     def send(self, frame: Frame) -> None:
@@ -197,11 +197,11 @@ class LocalLink:
 
     def _do(self, act: Callable[[socket.socket], T]) -> T:
         if self._socket is None:
-            raise LinkError(f"local {self._path}: not connected.")
+            raise TransportError(f"local {self._path}: not connected.")
         try:
             return act(self._socket)
         except OSError as error:
-            raise LinkError(f"local {self._path}: {error.strerror}.") from error
+            raise TransportError(f"local {self._path}: {error.strerror}.") from error
 
 
 def _receive(link: socket.socket, *, wait: float) -> bytes | None:

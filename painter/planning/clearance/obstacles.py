@@ -11,7 +11,7 @@ from pydrake.planning import CollisionChecker
 from scipy import ndimage
 
 from painter.errors import CollisionError
-from painter.planning.clearance.separation import Separation
+from painter.planning.clearance.separation import SeparatingAxisPrefilter
 from perception.ground import BoolArray, FloatArray, FrozenValue
 from perception.values import WallSegmentation
 
@@ -157,7 +157,7 @@ class ClearSpace:
             )
             assert added, box.name
         self._checker.SetPaddingAllRobotEnvironmentPairs(floor_clearance)
-        self._separation = Separation(self._checker, X_WT)
+        self._separation = SeparatingAxisPrefilter(self._checker, X_WT)
 
     def free(self, q: FloatArray, *, slack: float = 0.0) -> BoolArray:
         """Tells which configurations keep clear.
@@ -186,7 +186,7 @@ class ClearSpace:
 
     def _proven(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
         """Tells which configurations plainly keep clear; see `free`."""
-        return self._separation.proven(q, self._floor_clearance - slack)
+        return self._separation.surely_clear(q, self._floor_clearance - slack)
 
     def _checked(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
         """Tells which configurations keep clear, one by one; see `free`."""

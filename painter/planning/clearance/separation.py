@@ -130,7 +130,7 @@ class _Pairs(FrozenValue):
         return np.asarray(overlap.min(axis=0) <= -self.required)
 
 
-class Separation:
+class SeparatingAxisPrefilter:
     """Proves that configurations keep clear; what it does not prove stays open."""
 
     def __init__(self, checker: CollisionChecker, X_WT: RigidTransform) -> None:
@@ -190,7 +190,7 @@ class Separation:
         moving = self._shapes.count + np.flatnonzero(links > 0)
         self._around = self._shadows_around(checker, moving)
 
-    def proven(self, q: FloatArray, clearance: float) -> BoolArray:
+    def surely_clear(self, q: FloatArray, clearance: float) -> BoolArray:
         """Tells of which configurations it is plain that they keep clear.
 
         Args:

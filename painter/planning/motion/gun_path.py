@@ -17,7 +17,7 @@ from pydrake.math import RigidTransform
 
 from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
 from painter.planning.motion.blend import KNOTS, MovingState, Shares, evaluate
-from painter.planning.motion.joint_motion import SEARCH_SHARE, keeps_limits, shortest
+from painter.planning.motion.joint_motion import SEARCH_SHARE, shortest, within_limits
 from painter.planning.motion.surface_frame import SurfaceFrame
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
@@ -130,7 +130,7 @@ class ToolPath(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class SquareGun(FrozenValue):
+class WallIk(FrozenValue):
     """Inverse kinematics with the gun square to one wall, on one arm configuration.
 
     Attributes:
@@ -143,7 +143,7 @@ class SquareGun(FrozenValue):
     X_WT: RigidTransform
     surface: SurfaceFrame | None = None
 
-    def solve(self, p_TGs: FloatArray) -> FloatArray:
+    def inverse_kinematics(self, p_TGs: FloatArray) -> FloatArray:
         """Returns joint angles with the nozzle at points before the wall.
 
         Args:
@@ -184,7 +184,8 @@ class SquareGun(FrozenValue):
             (n,) bool; False also where the arm does not reach.
         """
         before, q, after = (
-            self.solve(p_TGs + time * v_TGs) for time in (-_DIFFERENCE, 0, _DIFFERENCE)
+            self.inverse_kinematics(p_TGs + time * v_TGs)
+            for time in (-_DIFFERENCE, 0, _DIFFERENCE)
         )
         v = (after - before) / (2.0 * _DIFFERENCE)
         a = (after - 2.0 * q + before) / _DIFFERENCE**2
@@ -210,7 +211,7 @@ class SquareGun(FrozenValue):
                 (after - before) / (2.0 * _DIFFERENCE),
                 (after - 2.0 * q + before) / _DIFFERENCE**2,
             )
-            for before, q, after in self.solve(places)
+            for before, q, after in self.inverse_kinematics(places)
         ]
 
 
@@ -224,7 +225,7 @@ class ToolMove(FrozenValue):
     """
 
     path: ToolPath
-    gun: SquareGun
+    gun: WallIk
 
     @property
     def duration(self) -> float:
@@ -238,14 +239,14 @@ class ToolMove(FrozenValue):
 
     def q(self, time: FloatArray) -> FloatArray:
         """See `Segment.q`."""
-        return self.gun.solve(self.path.p_TG(time))
+        return self.gun.inverse_kinematics(self.path.p_TG(time))
 
 
 def fastest_tool_blend(
     start: MovingState,
     end: MovingState,
     *,
-    gun: SquareGun,
+    gun: WallIk,
     limits: ArmLimits,
     hop: float = 0.0,
     rise: float = 0.5,
@@ -279,7 +280,7 @@ def fastest_tool_blend(
         """Looks at samples; at every third one if they come in threes."""
         p_TGs, _ = evaluate(start, end, durations, samples)
         p_TGs[..., 2] += heights
-        q = gun.solve(p_TGs)
+        q = gun.inverse_kinematics(p_TGs)
         before, at, after = (
             q[:, first : first + q.shape[1] - 2 : every] for first in range(3)
         )
@@ -300,7 +301,7 @@ def fastest_tool_blend(
 
     def certain(duration: float) -> bool:
         blend = ToolBlend(start, end, duration, hop, rise)
-        return keeps_limits(ToolMove(blend, gun).q, duration, limits)
+        return within_limits(ToolMove(blend, gun).q, duration, limits)
 
     duration = shortest(allowed, durations, certain, longest=longest, possible=possible)
     return None if duration is None else ToolBlend(start, end, duration, hop, rise)

@@ -177,7 +177,7 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
     move = least_travel(q0, q1, limits)
     # What gravity alone takes cannot be saved by going slower.
     for _ in range(_SLOWER_STEPS):
-        if keeps_limits(move.q, move.duration, limits):
+        if within_limits(move.q, move.duration, limits):
             break
         move = JointTravel(q0, q1, _SLOWER * move.speed_up, _SLOWER * move.cruise)
     return move
@@ -229,13 +229,13 @@ def fastest_joint_blend(
         return keeps
 
     def certain(duration: float) -> bool:
-        return keeps_limits(JointBlend(start, end, duration).q, duration, limits)
+        return within_limits(JointBlend(start, end, duration).q, duration, limits)
 
     duration = shortest(allowed, _DURATIONS, certain, possible=possible)
     return None if duration is None else JointBlend(start, end, duration)
 
 
-def keeps_limits(
+def within_limits(
     place: Callable[[FloatArray], FloatArray], duration: float, limits: ArmLimits
 ) -> bool:
     """Tells whether a move keeps its limits, looked at as densely as executed.

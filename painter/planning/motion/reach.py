@@ -6,7 +6,7 @@ import numpy as np
 
 from painter.errors import ReachError
 from painter.planning.arm.kinematics import ArmLimits
-from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.gun_path import WallIk
 from perception.ground import FloatArray
 
 _REACH_STEP = 0.05  # m, between the places at which reach is asked for ...
@@ -35,7 +35,7 @@ def nearest_standoffs(
     x: FloatArray,
     y: FloatArray,
     *,
-    gun: SquareGun,
+    gun: WallIk,
     limits: ArmLimits,
     near: float,
     far: float,
@@ -64,7 +64,7 @@ def nearest_standoffs(
     beyond = rows + stopping * np.sign(rows - rows.mean())
     places = np.meshgrid(standoffs, beyond, columns, indexing="ij")
     p_TGs = np.stack([place.ravel() for place in places[::-1]], axis=-1)
-    reached = limits.contains(gun.solve(p_TGs)).reshape(places[0].shape)
+    reached = limits.contains(gun.inverse_kinematics(p_TGs)).reshape(places[0].shape)
     # Out of reach up to the last stand-off at which it is.
     first = np.where(reached, 0, np.arange(1, standoffs.size + 1)[:, None, None])
     coarse = standoffs[np.minimum(first.max(axis=0), standoffs.size - 1)]
@@ -79,7 +79,7 @@ def _spread(axis: FloatArray, step: float) -> FloatArray:
 
 
 def require_reach(
-    p_TGs: FloatArray, *, gun: SquareGun, limits: ArmLimits, what: str
+    p_TGs: FloatArray, *, gun: WallIk, limits: ArmLimits, what: str
 ) -> FloatArray:
     """Solves for joint angles and raises if a point is out of reach.
 
@@ -95,7 +95,7 @@ def require_reach(
     Raises:
         ReachError: Tells which share is out of reach, the worst point and its figures.
     """
-    q = gun.solve(p_TGs)
+    q = gun.inverse_kinematics(p_TGs)
     bad = ~limits.contains(q)
     if not bad.any():
         return q
@@ -127,7 +127,7 @@ def require_reach(
     )
 
 
-def wrist_distances(p_TGs: FloatArray, gun: SquareGun) -> FloatArray:
+def wrist_distances(p_TGs: FloatArray, gun: WallIk) -> FloatArray:
     """Returns the shoulder-to-wrist distance (n,), m, that nozzle points (n, 3) need.
 
     With the gun square to the wall L's axes in T are x = -z, y = -x, z = y.

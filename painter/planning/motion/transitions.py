@@ -12,7 +12,7 @@ from painter.errors import CollisionError, PainterError, ReachError
 from painter.planning.arm.kinematics import ArmLimits
 from painter.planning.clearance.obstacles import ClearSpace
 from painter.planning.motion.blend import MovingState
-from painter.planning.motion.gun_path import SquareGun, ToolMove, fastest_tool_blend
+from painter.planning.motion.gun_path import ToolMove, WallIk, fastest_tool_blend
 from painter.planning.motion.joint_motion import (
     Segment,
     fastest_joint_blend,
@@ -26,7 +26,7 @@ _RISES = (0.5, 0.35, 0.25, 0.15)  # See `ToolBlend.rise`.
 _HOP_STEP = 0.05  # m; hops are rounded up to a multiple of it.
 # Standstills from which a pass is approached and to which it is left: (distance back
 # along the pass, distance away from the wall), m. Those first cost the least time.
-_ANCHORS = (
+_APPROACH_POSES = (
     (0.10, 0.03),
     (0.07, 0.0),
     (0.03, 0.06),
@@ -36,9 +36,9 @@ _ANCHORS = (
     (-0.30, 0.15),
     (-0.30, 0.30),
 )
-_DRAWN_BACK = (0.3, 0.2, 0.1)  # m from where the gun is, tried in turn.
-_DRAWN_OVER = (0.05, 0.10, 0.20)  # m, on the way from one rest to another.
-# The places that a transit goes over; see `Linker.transit`.
+_RETREATS = (0.3, 0.2, 0.1)  # m from where the gun is, tried in turn.
+_RETREATS_BETWEEN = (0.05, 0.10, 0.20)  # m, on the way from one rest to another.
+# The places that a transit goes over; see `TransitionPlanner.free_motion`.
 _ROUTES = (
     ("fold",),
     ("unfold",),
@@ -52,7 +52,7 @@ _SQUARE = 1e-6  # rad, at most, by which the gun is off where it counts as squar
 
 
 @dataclass(frozen=True, eq=False)
-class Linker(FrozenValue):
+class TransitionPlanner(FrozenValue):
     """Finds moves that keep joint limits and clearance.
 
     Attributes:
@@ -62,7 +62,7 @@ class Linker(FrozenValue):
         q_home: (5,) rad, folded pose over which detours go.
     """
 
-    gun: SquareGun
+    gun: WallIk
     limits: ArmLimits
     space: ClearSpace
     q_home: FloatArray
@@ -72,7 +72,7 @@ class Linker(FrozenValue):
         default_factory=dict, init=False, repr=False
     )
 
-    def between(self, start: MovingState, end: MovingState) -> list[Segment]:
+    def connect(self, start: MovingState, end: MovingState) -> list[Segment]:
         """Joins two moving states: by a blend, a hop, or a detour through rest.
 
         Args:
@@ -102,10 +102,10 @@ class Linker(FrozenValue):
 
         def look() -> list[Segment]:
             failure: PainterError | None = None
-            for anchor in _anchors(end, -1.0):
+            for approach in _approach_poses(end, -1.0):
                 try:
-                    arrive = self._blend(anchor, end, failure)
-                    return [*self.transit(q, start_q(arrive)), arrive]
+                    arrive = self._blend(approach, end, failure)
+                    return [*self.free_motion(q, start_q(arrive)), arrive]
                 except (CollisionError, ReachError) as error:
                     failure = failure or error
             assert failure is not None
@@ -118,9 +118,9 @@ class Linker(FrozenValue):
 
         def look() -> list[Segment]:
             failure: PainterError | None = None
-            for anchor in _anchors(start, 1.0):
+            for approach in _approach_poses(start, 1.0):
                 try:
-                    return [self._blend(start, anchor, failure)]
+                    return [self._blend(start, approach, failure)]
                 except (CollisionError, ReachError) as error:
                     failure = failure or error
             assert failure is not None
@@ -129,7 +129,7 @@ class Linker(FrozenValue):
         (move,) = self._once(("to rest", start.key, b""), look)
         return move
 
-    def transit(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
+    def free_motion(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
         """Goes from rest to rest: directly, or over poses where there is more room.
 
         These are the folded pose with the yaw of the start, with that of the end, and
@@ -149,11 +149,11 @@ class Linker(FrozenValue):
         """
         direct = rest_to_rest(q0, q1, self.limits)
         best: list[Segment] = [direct] if self.clear(direct) else []
-        best = best or self._drawn_over(q0, q1)
+        best = best or self._over_retreats(q0, q1)
         places = {"start": q0, "end": q1}
         for q, fold, back in ((q0, "fold", "back"), (q1, "unfold", "forth")):
             places[fold] = self._folded(float(q[0]))
-            drawn = self._drawn_back(q)
+            drawn = self._retreat(q)
             if drawn is not None:
                 places[back] = drawn
 
@@ -215,15 +215,15 @@ class Linker(FrozenValue):
             raise known
         return known
 
-    def _drawn_over(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
+    def _over_retreats(self, q0: FloatArray, q1: FloatArray) -> list[Segment]:
         """Returns the quickest clear move of the square gun over a hop, if any."""
         _, p_WGs = self.gun.kinematics.gun_poses(np.stack([q0, q1]))
         p_TGs = np.array([self.gun.place(p_WG) for p_WG in p_WGs])
-        if not np.allclose(self.gun.solve(p_TGs), [q0, q1], atol=_SQUARE):
+        if not np.allclose(self.gun.inverse_kinematics(p_TGs), [q0, q1], atol=_SQUARE):
             return []
         start, end = (MovingState.at_rest(p_TG) for p_TG in p_TGs)
         best: list[Segment] = []
-        for hop, rise in itertools.product(_DRAWN_OVER, _RISES):
+        for hop, rise in itertools.product(_RETREATS_BETWEEN, _RISES):
             move = self._tool_move(start, end, hop, rise, _duration(best))
             if move is not None and self.clear(move):
                 best = [move]
@@ -295,11 +295,11 @@ class Linker(FrozenValue):
         steps = np.unique(np.ceil(needed[needed > 0.0] / _HOP_STEP))
         return [0.0, *(steps * _HOP_STEP).tolist()]
 
-    def _drawn_back(self, q: FloatArray) -> FloatArray | None:
+    def _retreat(self, q: FloatArray) -> FloatArray | None:
         """Returns the pose with the gun drawn farthest back from the wall, if any."""
         _, p_WGs = self.gun.kinematics.gun_poses(q[None])
         p_TG = self.gun.place(p_WGs[0])
-        backs = self.gun.solve(p_TG + np.outer(_DRAWN_BACK, [0.0, 0.0, 1.0]))
+        backs = self.gun.inverse_kinematics(p_TG + np.outer(_RETREATS, [0.0, 0.0, 1.0]))
         good = self.limits.contains(backs)
         good[good] = self.space.free(backs[good])
         return np.array(backs[np.argmax(good)]) if good.any() else None
@@ -333,13 +333,13 @@ def _duration(way: Sequence[Segment]) -> float:
     return sum(segment.duration for segment in way) if way else math.inf
 
 
-def _anchors(state: MovingState, sign: float) -> list[MovingState]:
+def _approach_poses(state: MovingState, sign: float) -> list[MovingState]:
     """Returns standstills behind (-1) or beyond (+1) a moving nozzle in T."""
     along = sign * state.v / np.linalg.norm(state.v)
     away = np.array([0.0, 0.0, 1.0])
     return [
         MovingState.at_rest(state.x + back * along + out * away)
-        for back, out in _ANCHORS
+        for back, out in _APPROACH_POSES
     ]
 
 

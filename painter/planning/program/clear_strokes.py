@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from painter.planning.motion.reach import require_reach
-from painter.planning.motion.transitions import Linker
+from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.spray_path import SkippedStroke, Stroke
 from painter.planning.strokes.film_fit import LEAST_FLOW
 from perception.ground import BoolArray, FloatArray
@@ -24,7 +24,7 @@ _MOST_OUT_OF_REACH = 0.05
 
 
 def clear_strokes(
-    strokes: Sequence[Stroke], linker: Linker, min_stroke: float
+    strokes: Sequence[Stroke], transitions: TransitionPlanner, min_stroke: float
 ) -> tuple[list[Stroke], list[SkippedStroke]]:
     """Cuts strokes back to what keeps clear.
 
@@ -32,7 +32,7 @@ def clear_strokes(
 
     Args:
         strokes: In T.
-        linker: Knows reach and clearance.
+        transitions: Knows reach and clearance.
         min_stroke: Shorter ones are not kept, m.
 
     Returns:
@@ -44,8 +44,8 @@ def clear_strokes(
     """
     if not strokes:
         return [], []
-    if linker.gun.surface is not None:
-        strokes = [_slowed(stroke, linker) for stroke in strokes]
+    if transitions.gun.surface is not None:
+        strokes = [_slowed(stroke, transitions) for stroke in strokes]
     shares = [_shares(stroke) for stroke in strokes]
     counts = [share.size for share in shares]
     # All at once: to ask for one place takes as long as to ask for fifty.
@@ -58,18 +58,22 @@ def clear_strokes(
             for stroke, share in zip(strokes, shares, strict=True)
         ]
     )
-    q = linker.gun.solve(p_TGs)
-    reached = linker.limits.contains(q)
+    q = transitions.gun.inverse_kinematics(p_TGs)
+    reached = transitions.limits.contains(q)
     total = sum(stroke.length for stroke in strokes)
     first_time = np.repeat([stroke.kind != "touch_up" for stroke in strokes], counts)
     missed = np.count_nonzero(first_time & ~reached) * _STEP
     if missed > _MOST_OUT_OF_REACH * total or not reached.any():
-        require_reach(p_TGs, gun=linker.gun, limits=linker.limits, what="strokes")
+        require_reach(
+            p_TGs, gun=transitions.gun, limits=transitions.limits, what="strokes"
+        )
     free = np.array(reached)
-    free[reached] = linker.space.free(q[reached])
+    free[reached] = transitions.space.free(q[reached])
     turns = np.ones(len(q), dtype=bool)
-    if linker.gun.surface is not None:
-        turns = np.concatenate([_keeps_rates(stroke, linker) for stroke in strokes])
+    if transitions.gun.surface is not None:
+        turns = np.concatenate(
+            [_keeps_rates(stroke, transitions) for stroke in strokes]
+        )
     free &= turns
     clear: list[Stroke] = []
     skipped: list[SkippedStroke] = []
@@ -80,19 +84,19 @@ def clear_strokes(
             clear.append(stroke)
             continue
         kept, lost = _cut_back(
-            stroke, q[rows], free[rows], turns[rows], linker, min_stroke
+            stroke, q[rows], free[rows], turns[rows], transitions, min_stroke
         )
         clear += kept
         skipped += lost
     return clear, skipped
 
 
-def has_run_out(strokes: Sequence[Stroke], linker: Linker) -> BoolArray:
+def has_run_out(strokes: Sequence[Stroke], transitions: TransitionPlanner) -> BoolArray:
     """Tells beyond which strokes the gun has room to come to a stand, as they go.
 
     Args:
         strokes: In T.
-        linker: Knows reach and clearance.
+        transitions: Knows reach and clearance.
 
     Returns:
         (n,) bool; where it is True, to look for the move itself is hardly ever in vain.
@@ -107,9 +111,9 @@ def has_run_out(strokes: Sequence[Stroke], linker: Linker) -> BoolArray:
             for beyond, out in RUN_OUT
         ]
     )
-    q = linker.gun.solve(p_TGs)
-    free = linker.limits.contains(q)
-    free[free] = linker.space.free(q[free])
+    q = transitions.gun.inverse_kinematics(p_TGs)
+    free = transitions.limits.contains(q)
+    free[free] = transitions.space.free(q[free])
     return np.asarray(free.reshape(len(strokes), -1).all(axis=1))
 
 
@@ -118,7 +122,7 @@ def _shares(stroke: Stroke) -> FloatArray:
     return np.linspace(0.0, 1.0, max(2, int(np.ceil(stroke.length / _STEP)) + 1))
 
 
-def _slowed(stroke: Stroke, linker: Linker) -> Stroke:
+def _slowed(stroke: Stroke, transitions: TransitionPlanner) -> Stroke:
     """Slows a stroke until the joints can follow it over a bent wall.
 
     Its flow falls by as much, so that its film stays. A stroke that half its speed does
@@ -127,19 +131,19 @@ def _slowed(stroke: Stroke, linker: Linker) -> Stroke:
     for factor in _SLOWER:
         slower = stroke.replace(speed=factor * stroke.speed, flow=factor * stroke.flow)
         enough = slower.flow >= min(LEAST_FLOW, stroke.flow)
-        if enough and _keeps_rates(slower, linker).all():
+        if enough and _keeps_rates(slower, transitions).all():
             return slower
     return stroke
 
 
-def _keeps_rates(stroke: Stroke, linker: Linker) -> BoolArray:
+def _keeps_rates(stroke: Stroke, transitions: TransitionPlanner) -> BoolArray:
     """Tells of a stroke's places (n,) where the joints can follow it at its speed."""
     travel = stroke.end_T - stroke.start_T
     p_TGs = nozzle_points(
         stroke.start_T + np.outer(_shares(stroke), travel), stroke.standoff
     )
     v_TG = np.append(travel * (stroke.speed / stroke.length), 0.0)
-    return linker.gun.keeps_rates(p_TGs, v_TG, linker.limits)
+    return transitions.gun.keeps_rates(p_TGs, v_TG, transitions.limits)
 
 
 def nozzle_points(p_T: FloatArray, standoff: float) -> FloatArray:
@@ -152,7 +156,7 @@ def _cut_back(
     q: FloatArray,
     free: BoolArray,
     turns: BoolArray,
-    linker: Linker,
+    transitions: TransitionPlanner,
     min_stroke: float,
 ) -> tuple[list[Stroke], list[SkippedStroke]]:
     """Returns what stays of a stroke that is free at some of evenly spaced places."""
@@ -175,12 +179,12 @@ def _cut_back(
             skipped.append(SkippedStroke(part, "shorter than raster.min_stroke"))
         else:
             middle = (first + last) // 2
-            if not linker.limits.contains(q[[middle]])[0]:
+            if not transitions.limits.contains(q[[middle]])[0]:
                 reason = "out of the arm's reach"
             elif not turns[middle]:
                 reason = _TOO_BENT
             else:
-                reason = linker.space.worst_pair(q[middle])
+                reason = transitions.space.worst_pair(q[middle])
             skipped.append(SkippedStroke(part, reason))
     return clear, skipped
 

@@ -12,14 +12,14 @@ from painter.planning.clearance.obstacles import ClearSpace, segmentation_boxes
 from painter.planning.clearance.tool_shape import standoffs_beside, tool_boxes
 from painter.planning.config import MotionConfig, RasterConfig, TipConfig
 from painter.planning.film.film_model import Site, margin_cells
-from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.gun_path import WallIk
 from painter.planning.motion.joint_motion import chain, planning_limits, start_times
 from painter.planning.motion.reach import nearest_standoffs
 from painter.planning.motion.surface_frame import SurfaceFrame, above_wall
-from painter.planning.motion.transitions import Linker
+from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.motion.verify import verify_motion, verify_strokes
 from painter.planning.program.clear_strokes import RUN_OUT, clear_strokes
-from painter.planning.program.stroke_links import link_strokes
+from painter.planning.program.stroke_links import connect_strokes
 from painter.planning.spray_path import PaintProgram, Stroke
 from painter.planning.strokes.raster import plan_strokes, raster_film
 from painter.planning.strokes.touch_up import touch_up_strokes
@@ -125,15 +125,15 @@ class ProgramPlanner(FrozenValue):
             clearance=motion.clearance,
             floor_clearance=motion.floor_clearance,
         )
-        linker = Linker(
+        transitions = TransitionPlanner(
             gun=gun,
             limits=planning_limits(limits, motion.limit_share),
             space=space,
             q_home=np.deg2rad(motion.home_deg),
         )
-        clear, skipped = clear_strokes(wanted, linker, self.raster.min_stroke)
-        path, strokes, passes, unlinked = link_strokes(
-            clear, q0, linker, self.raster.flash_off
+        clear, skipped = clear_strokes(wanted, transitions, self.raster.min_stroke)
+        path, strokes, passes, unlinked = connect_strokes(
+            clear, q0, transitions, self.raster.flash_off
         )
         starts = start_times(path)[:-1]
         flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
@@ -168,10 +168,10 @@ class ProgramPlanner(FrozenValue):
         )
         return program
 
-    def _gun(self, segmentation: WallSegmentation) -> SquareGun:
+    def _gun(self, segmentation: WallSegmentation) -> WallIk:
         """Returns the gun before a wall; it follows the wall's surface."""
         surface = SurfaceFrame.of_wall(segmentation)
-        return SquareGun(self.kinematics, segmentation.X_WT, surface)
+        return WallIk(self.kinematics, segmentation.X_WT, surface)
 
     def _nearest(self, segmentation: WallSegmentation) -> FloatArray:
         """Returns the least stand-offs on a tile, by reach and by what stands out."""

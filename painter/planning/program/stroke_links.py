@@ -13,7 +13,7 @@ from painter.errors import CollisionError, ReachError
 from painter.planning.motion.blend import MovingState
 from painter.planning.motion.gun_path import Pass, ToolMove
 from painter.planning.motion.joint_motion import Segment, Stand
-from painter.planning.motion.transitions import Linker, end_q
+from painter.planning.motion.transitions import TransitionPlanner, end_q
 from painter.planning.program.clear_strokes import has_run_out, nozzle_points
 from painter.planning.spray_path import SkippedStroke, Stroke
 from painter.planning.strokes.stroke_order import order_strokes
@@ -30,15 +30,18 @@ _SAME = 1e-9
 Links = tuple[list[Segment], tuple[Stroke, ...], list[int], list[SkippedStroke]]
 
 
-def link_strokes(
-    strokes: Sequence[Stroke], q0: FloatArray, linker: Linker, flash_off: float
+def connect_strokes(
+    strokes: Sequence[Stroke],
+    q0: FloatArray,
+    transitions: TransitionPlanner,
+    flash_off: float,
 ) -> Links:
     """Orders and joins strokes coat by coat; the arm rests at home between them.
 
     Args:
         strokes: Clear of obstacles, in any order.
         q0: (5,) rad, where the arm is at rest.
-        linker: Finds the moves; its home is where the arm rests at last.
+        transitions: Finds the moves; its home is where the arm rests at last.
         flash_off: Rest between two coats, s.
 
     Returns:
@@ -52,33 +55,35 @@ def link_strokes(
     done: list[Stroke] = []
     passes: list[int] = []
     skipped: list[SkippedStroke] = []
-    gun, q = linker.gun, q0
+    gun, q = transitions.gun, q0
     for coat in sorted({stroke.coat for stroke in strokes}) or [1]:
         if path and flash_off > 0.0:
             path.append(Stand(q, flash_off))
         rests = [
             gun.place(p_WG)
-            for p_WG in gun.kinematics.nozzle(np.stack([q, linker.q_home]))
+            for p_WG in gun.kinematics.nozzle(np.stack([q, transitions.q_home]))
         ]
         of_coat = [stroke for stroke in strokes if stroke.coat == coat]
         ordered = order_strokes(of_coat, *rests)
-        segments, sprayed, of_path, unlinked = _linked(ordered, q, linker)
+        segments, sprayed, of_path, unlinked = _linked(ordered, q, transitions)
         passes += [len(path) + index for index in of_path]
         path += segments
         done += sprayed
         skipped += unlinked
-        q = linker.q_home
+        q = transitions.q_home
     return path, tuple(done), passes, skipped
 
 
-def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> Links:
+def _linked(
+    strokes: Sequence[Stroke], q0: FloatArray, transitions: TransitionPlanner
+) -> Links:
     """Joins strokes by moves, from rest at `q0` to rest at home.
 
     Beyond a stroke with run-out there is believed to be a way back. Where it turns out
     that from there one cannot go on, the stroke is joined once more, its way back
     looked for.
     """
-    believed = has_run_out(strokes, linker)
+    believed = has_run_out(strokes, transitions)
     fits: list[_Fit] = []
     home: list[Segment] = []
     while not home:
@@ -88,9 +93,11 @@ def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> Links:
         try:
             if len(fits) < len(strokes):
                 wanted, roomy = strokes[len(fits)], bool(believed[len(fits)])
-                fits.append(_fit(wanted, roomy, last, q0, linker, in_full=doubtful))
+                fits.append(
+                    _fit(wanted, roomy, last, q0, transitions, in_full=doubtful)
+                )
             else:
-                home = _way_home(last, q0, linker)
+                home = _way_home(last, q0, transitions)
         except (CollisionError, ReachError):
             if not doubtful:
                 raise
@@ -103,7 +110,7 @@ def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> Links:
     for fit in fits:
         skipped += fit.skipped
         if fit.stroke is not None:
-            path += [*fit.link, ToolMove(_pass(fit.stroke), linker.gun)]
+            path += [*fit.link, ToolMove(_pass(fit.stroke), transitions.gun)]
             passes.append(len(path) - 1)
             sprayed.append(fit.stroke)
     if strokes and not sprayed:
@@ -111,12 +118,14 @@ def _linked(strokes: Sequence[Stroke], q0: FloatArray, linker: Linker) -> Links:
     return [*path, *home], tuple(sprayed), passes, skipped
 
 
-def _way_home(last: Pass | None, q0: FloatArray, linker: Linker) -> list[Segment]:
+def _way_home(
+    last: Pass | None, q0: FloatArray, transitions: TransitionPlanner
+) -> list[Segment]:
     """Goes from the last pass, or from rest at `q0`, to rest at home."""
     if last is None:
-        return linker.transit(q0, linker.q_home)
-    leave = linker.to_rest(last.end)
-    return [leave, *linker.transit(end_q(leave), linker.q_home)]
+        return transitions.free_motion(q0, transitions.q_home)
+    leave = transitions.to_rest(last.end)
+    return [leave, *transitions.free_motion(end_q(leave), transitions.q_home)]
 
 
 @dataclass(frozen=True)
@@ -139,7 +148,7 @@ def _fit(
     roomy: bool,
     last: Pass | None,
     q0: FloatArray,
-    linker: Linker,
+    transitions: TransitionPlanner,
     *,
     in_full: bool = False,
 ) -> _Fit:
@@ -160,7 +169,7 @@ def _fit(
         if roomy:
             break
         try:
-            linker.to_rest(_pass(stroke).end)  # There must be a way back.
+            transitions.to_rest(_pass(stroke).end)  # There must be a way back.
             break
         except (CollisionError, ReachError) as error:
             first_failure = first_failure or str(error)
@@ -173,11 +182,11 @@ def _fit(
         start = _pass(stroke).start
         try:
             if last is None:
-                link = linker.from_rest(q0, start)
+                link = transitions.from_rest(q0, start)
             elif _goes_on(last.end, start):
                 link = []
             else:
-                link = linker.between(last.end, start)
+                link = transitions.connect(last.end, start)
         except (CollisionError, ReachError) as error:
             if in_full:
                 raise

@@ -16,10 +16,10 @@ from painter.planning.config import (
     ScanConfig,
     TileConfig,
 )
-from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.gun_path import WallIk
 from painter.planning.motion.joint_motion import Segment, chain, planning_limits
 from painter.planning.motion.reach import require_reach, tile_points
-from painter.planning.motion.transitions import Linker
+from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.motion.verify import verify_motion
 from painter.planning.scan.more_looks import more_looks
 from painter.planning.scan.scan_path import look_segments, scan_segments
@@ -31,7 +31,7 @@ GOALS = ("home", "look", "scan", "retract")
 
 
 @dataclass(frozen=True, eq=False)
-class TransferPlanner(FrozenValue):
+class FreeMotionPlanner(FrozenValue):
     """Plans motions with the gun closed for one robot with one set of settings.
 
     Attributes:
@@ -81,20 +81,20 @@ class TransferPlanner(FrozenValue):
         if goal in ("look", "scan"):
             points = tile_points(tile.width, tile.height, self.standoff)
             what = f"tile of {tile.width:.2f} x {tile.height:.2f} m"
-            gun = SquareGun(self.kinematics, X_WT)
+            gun = WallIk(self.kinematics, X_WT)
             require_reach(points, gun=gun, limits=self.limits, what=what)
         # After painting, or once stopped half way, the gun may stand within the
         # keepout.
         keepouts = (0.0,) if goal == "retract" else (self.motion.wall_keepout, 0.0)
-        linker = self._linker(q0, X_WT, keepouts)
+        transitions = self._linker(q0, X_WT, keepouts)
         path: Sequence[Segment]
         if goal == "scan":
-            path = scan_segments(q0, tile, self.scan, linker)
+            path = scan_segments(q0, tile, self.scan, transitions)
         elif goal == "look":
-            path = look_segments(q0, tile, self.scan, linker)
+            path = look_segments(q0, tile, self.scan, transitions)
         else:
-            path = linker.transit(q0, linker.q_home)
-        return self._verified(path, linker.space, what=f"motion {goal!r}")
+            path = transitions.free_motion(q0, transitions.q_home)
+        return self._verified(path, transitions.space, what=f"motion {goal!r}")
 
     def more_looks(
         self, q0: FloatArray, relief: Relief, X_WT: RigidTransform
@@ -121,18 +121,18 @@ class TransferPlanner(FrozenValue):
             return None
         keepout = max(self.motion.wall_keepout, float(relief.height.max()))
         try:
-            linker = self._linker(q0, X_WT, (keepout,))
+            transitions = self._linker(q0, X_WT, (keepout,))
         except CollisionError:
             return None
-        path = more_looks(q0, relief, self.scan, linker)
+        path = more_looks(q0, relief, self.scan, transitions)
         if not path:
             return None
-        return self._verified(path, linker.space, what="motion 'more looks'")
+        return self._verified(path, transitions.space, what="motion 'more looks'")
 
     def _linker(
         self, q0: FloatArray, X_WT: RigidTransform, keepouts: Sequence[float]
-    ) -> Linker:
-        """Returns a linker with the largest keepout that the arm does not stand in."""
+    ) -> TransitionPlanner:
+        """Returns a planner with the largest keep-out that the arm does not stand in."""
         motion = self.motion
         for keepout in keepouts:
             space = ClearSpace(
@@ -143,8 +143,8 @@ class TransferPlanner(FrozenValue):
                 floor_clearance=motion.floor_clearance,
             )
             if space.all_free(q0[None]):
-                return Linker(
-                    gun=SquareGun(self.kinematics, X_WT),
+                return TransitionPlanner(
+                    gun=WallIk(self.kinematics, X_WT),
                     limits=planning_limits(self.limits, motion.limit_share),
                     space=space,
                     q_home=np.deg2rad(motion.home_deg),

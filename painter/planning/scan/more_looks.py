@@ -15,11 +15,11 @@ import numpy as np
 from painter.errors import CollisionError
 from painter.planning.config import ScanConfig
 from painter.planning.motion.joint_motion import Segment, Stand, rest_to_rest
-from painter.planning.motion.transitions import Linker, end_q
+from painter.planning.motion.transitions import TransitionPlanner, end_q
 from painter.planning.scan.scan_path import (
     BASELINE,
     nozzle_under_camera,
-    standable,
+    reachable_and_clear,
     view_at,
 )
 from perception.fine_steps.shadows import Relief
@@ -33,7 +33,7 @@ _INSIDE = 0.02  # m, that a place on the wall lies inside the picture at least.
 
 
 def more_looks(
-    q0: FloatArray, relief: Relief, scan: ScanConfig, linker: Linker
+    q0: FloatArray, relief: Relief, scan: ScanConfig, transitions: TransitionPlanner
 ) -> list[Segment]:
     """Plans looks at hidden wall, each held for `scan.more_look_time`.
 
@@ -44,16 +44,16 @@ def more_looks(
         q0: (5,) rad, where the arm stands, at rest.
         relief: What the scan has found.
         scan: Settings; `distance`, `more_looks` and `more_look_time` are used.
-        linker: Reach and clearance.
+        transitions: Reach and clearance.
 
     Returns:
         The motion to rest at the last place; empty if there is nothing worth a look.
     """
     path: list[Segment] = []
-    for q in _in_order(q0, look_poses(q0, relief, scan, linker), linker):
+    for q in _in_order(q0, look_poses(q0, relief, scan, transitions), transitions):
         at = end_q(path[-1]) if path else q0
         try:
-            path += linker.transit(at, q)
+            path += transitions.free_motion(at, q)
         except CollisionError:
             continue
         path.append(Stand(q, scan.more_look_time))
@@ -61,7 +61,7 @@ def more_looks(
 
 
 def look_poses(
-    q0: FloatArray, relief: Relief, scan: ScanConfig, linker: Linker
+    q0: FloatArray, relief: Relief, scan: ScanConfig, transitions: TransitionPlanner
 ) -> FloatArray:
     """Chooses poses of the arm that together show most of the hidden wall.
 
@@ -70,7 +70,7 @@ def look_poses(
             taken.
         relief: What the scan has found.
         scan: Settings; `distance` and `more_looks` are used.
-        linker: Reach and clearance.
+        transitions: Reach and clearance.
 
     Returns:
         (k, 5) rad, k <= `scan.more_looks`.
@@ -89,9 +89,9 @@ def look_poses(
         shown &= seen_from(
             p_TCs + [eye, 0.0, 0.0], p_TQs, relief.height, cell=relief.cell
         )
-    p_TGs = nozzle_under_camera(p_TCs, linker.gun)
-    shown &= standable(p_TGs, linker)[:, None]
-    q = linker.gun.solve(p_TGs)
+    p_TGs = nozzle_under_camera(p_TCs, transitions.gun)
+    shown &= reachable_and_clear(p_TGs, transitions)[:, None]
+    q = transitions.gun.inverse_kinematics(p_TGs)
     chosen: list[FloatArray] = []
     for _ in range(scan.more_looks):
         gain = shown.sum(axis=1)
@@ -99,7 +99,7 @@ def look_poses(
             break
         # What a nearer place leaves out may be no more than is left out anyway.
         good = np.flatnonzero(gain > gain.max() - least)
-        turn = np.abs(q[good] - q0) / linker.limits.v_max
+        turn = np.abs(q[good] - q0) / transitions.limits.v_max
         best = int(good[np.argmin(turn.max(axis=1))])
         chosen.append(q[best])
         shown &= ~shown[best]
@@ -129,10 +129,12 @@ def _in_picture(p_TCs: FloatArray, p_TQs: FloatArray) -> np.ndarray:
     return inside
 
 
-def _in_order(q0: FloatArray, poses: FloatArray, linker: Linker) -> list[FloatArray]:
+def _in_order(
+    q0: FloatArray, poses: FloatArray, transitions: TransitionPlanner
+) -> list[FloatArray]:
     """Returns the poses in the order that takes least time straight from `q0`."""
     # To compare, rates will do.
-    limits = linker.limits.replace(torques=None, nozzle=None)
+    limits = transitions.limits.replace(torques=None, nozzle=None)
     stops = [q0, *poses]
     times = [[rest_to_rest(a, b, limits).duration for b in stops] for a in stops]
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from painter.errors import CollisionError, PainterError, ReachError
 from painter.planning.config import ScanConfig, TileConfig
-from painter.planning.motion.gun_path import Pass, SquareGun, ToolMove
+from painter.planning.motion.gun_path import Pass, ToolMove, WallIk
 from painter.planning.motion.joint_motion import SEARCH_SHARE, Segment, rest_to_rest
 from painter.planning.motion.reach import require_reach
-from painter.planning.motion.transitions import Linker
+from painter.planning.motion.transitions import TransitionPlanner
 from perception.ground import FloatArray, FrozenValue
 
 _HFOV = np.deg2rad(87.0)
@@ -55,7 +55,7 @@ def view_at(distance: float) -> View:
     return View(half_width - BASELINE, half_width, half_height)
 
 
-def nozzle_under_camera(p_TCs: FloatArray, gun: SquareGun) -> FloatArray:
+def nozzle_under_camera(p_TCs: FloatArray, gun: WallIk) -> FloatArray:
     """Returns where the nozzle is with the square camera at p_TCs (n, 3), m, in T.
 
     With the tool square to the wall L's axes in T are x = -z, y = -x, z = y.
@@ -66,7 +66,7 @@ def nozzle_under_camera(p_TCs: FloatArray, gun: SquareGun) -> FloatArray:
 
 
 def look_segments(
-    q0: FloatArray, tile: TileConfig, scan: ScanConfig, linker: Linker
+    q0: FloatArray, tile: TileConfig, scan: ScanConfig, transitions: TransitionPlanner
 ) -> list[Segment]:
     """Plans first sight: from rest at `q0` (5,), rad, over two quarters of the tile.
 
@@ -82,11 +82,11 @@ def look_segments(
     """
     # Ends at the upper left, where the scan begins.
     lower, upper = (
-        look_poses(np.array([x * tile.width, y * tile.height]), scan, linker)
+        look_poses(np.array([x * tile.width, y * tile.height]), scan, transitions)
         for x, y in ((0.75, 0.25), (0.25, 0.75))
     )
     # To compare, rates will do.
-    limits = linker.limits.replace(torques=None, nozzle=None)
+    limits = transitions.limits.replace(torques=None, nozzle=None)
 
     def times(starts: FloatArray, ends: FloatArray) -> FloatArray:
         return np.array(
@@ -96,12 +96,14 @@ def look_segments(
     total = times(q0[None], lower).T + times(lower, upper)
     first, second = np.unravel_index(int(np.argmin(total)), total.shape)
     return [
-        *linker.transit(q0, lower[first]),
-        *linker.transit(lower[first], upper[second]),
+        *transitions.free_motion(q0, lower[first]),
+        *transitions.free_motion(lower[first], upper[second]),
     ]
 
 
-def look_poses(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatArray:
+def look_poses(
+    centre_T: FloatArray, scan: ScanConfig, transitions: TransitionPlanner
+) -> FloatArray:
     """Finds the poses that look at a place or near it, where the arm can stand.
 
     Straight before the shoulder the arm would have to fold flat.
@@ -109,7 +111,7 @@ def look_poses(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatA
     Args:
         centre_T: (2,) m, in T's x and y.
         scan: Settings; `look_distance` is kept.
-        linker: Reach and clearance.
+        transitions: Reach and clearance.
 
     Returns:
         (n, 5) rad, n >= 1, the camera within 0.3 m beside, above or below the place.
@@ -120,18 +122,20 @@ def look_poses(centre_T: FloatArray, scan: ScanConfig, linker: Linker) -> FloatA
     ticks = _LOOK_SPREAD * np.linspace(-1.0, 1.0, _LOOK_TICKS)
     x, y = np.meshgrid(centre_T[0] + ticks, centre_T[1] + ticks)
     p_TCs = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, scan.look_distance)])
-    p_TGs = nozzle_under_camera(p_TCs, linker.gun)
-    good = standable(p_TGs, linker)
+    p_TGs = nozzle_under_camera(p_TCs, transitions.gun)
+    good = reachable_and_clear(p_TGs, transitions)
     if not good.any():
         raise ReachError(
             f"look: no clear pose with the camera {scan.look_distance:.2f} m before "
             f"the wall within {_LOOK_SPREAD} m of T ({centre_T[0]:.2f}, "
             f"{centre_T[1]:.2f}) m."
         )
-    return linker.gun.solve(p_TGs[good])
+    return transitions.gun.inverse_kinematics(p_TGs[good])
 
 
-def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
+def scan_rows(
+    tile: TileConfig, scan: ScanConfig, transitions: TransitionPlanner
+) -> list[Pass]:
     """Lays level camera rows over the tile, top row first, ending at its left.
 
     As few rows as cover the tile and its margin with at least the overlap wanted,
@@ -142,7 +146,7 @@ def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
     Args:
         tile: Size of the tile.
         scan: Settings; overlap and margin are kept.
-        linker: Reach and clearance.
+        transitions: Reach and clearance.
 
     Returns:
         Rows as passes of the nozzle.
@@ -155,14 +159,16 @@ def scan_rows(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
     for share in _DISTANCE_SHARES:
         nearer = dataclasses.replace(scan, distance=share * scan.distance)
         try:
-            return _rows_at_distance(tile, nearer, linker)
+            return _rows_at_distance(tile, nearer, transitions)
         except (CollisionError, ReachError) as error:
             failure = failure or error
     assert failure is not None
     raise failure
 
 
-def _rows_at_distance(tile: TileConfig, scan: ScanConfig, linker: Linker) -> list[Pass]:
+def _rows_at_distance(
+    tile: TileConfig, scan: ScanConfig, transitions: TransitionPlanner
+) -> list[Pass]:
     """Lays the rows with the camera exactly `scan.distance` from the wall."""
     view = view_at(scan.distance)
     left = -scan.margin + view.left
@@ -170,21 +176,21 @@ def _rows_at_distance(tile: TileConfig, scan: ScanConfig, linker: Linker) -> lis
     if right - left < _SHORTEST_ROW:
         middle = (left + right) / 2.0
         left, right = middle - _SHORTEST_ROW / 2.0, middle + _SHORTEST_ROW / 2.0
-    heights = _row_heights(tile, scan, linker, left, right)[::-1]
+    heights = _row_heights(tile, scan, transitions, left, right)[::-1]
     rows: list[Pass] = []
     rightwards = len(heights) % 2 == 0
     for height in heights:
         x0, x1 = (left, right) if rightwards else (right, left)
         p_TCs = np.array([[x0, height, scan.distance], [x1, height, scan.distance]])
-        p_TGs = nozzle_under_camera(p_TCs, linker.gun)
+        p_TGs = nozzle_under_camera(p_TCs, transitions.gun)
         row = Pass.between(p_TGs[0], p_TGs[1], scan.speed)
-        rows.append(_slowed(row, linker))
+        rows.append(_slowed(row, transitions))
         rightwards = not rightwards
     return rows
 
 
 def scan_segments(
-    q0: FloatArray, tile: TileConfig, scan: ScanConfig, linker: Linker
+    q0: FloatArray, tile: TileConfig, scan: ScanConfig, transitions: TransitionPlanner
 ) -> list[Segment]:
     """Plans the whole scan from rest at `q0` (5,) rad, to rest beside the last row.
 
@@ -192,18 +198,22 @@ def scan_segments(
         ReachError: A row or the way to it is out of reach.
         CollisionError: There is no clear way.
     """
-    rows = scan_rows(tile, scan, linker)
-    path = linker.from_rest(q0, rows[0].start)
+    rows = scan_rows(tile, scan, transitions)
+    path = transitions.from_rest(q0, rows[0].start)
     for index, row in enumerate(rows):
         if index > 0:
-            path += linker.between(rows[index - 1].end, row.start)
-        path.append(ToolMove(row, linker.gun))
-    path.append(linker.to_rest(rows[-1].end))
+            path += transitions.connect(rows[index - 1].end, row.start)
+        path.append(ToolMove(row, transitions.gun))
+    path.append(transitions.to_rest(rows[-1].end))
     return path
 
 
 def _row_heights(
-    tile: TileConfig, scan: ScanConfig, linker: Linker, left: float, right: float
+    tile: TileConfig,
+    scan: ScanConfig,
+    transitions: TransitionPlanner,
+    left: float,
+    right: float,
 ) -> list[float]:
     """Returns row heights in T, bottom to top, m."""
     view = view_at(scan.distance)
@@ -218,7 +228,11 @@ def _row_heights(
     x = np.linspace(left, right, int((right - left) / _POINT_STEP) + 2)
 
     def clear(height: float) -> bool:
-        return bool(standable(_row_points(x, height, scan, linker), linker).all())
+        return bool(
+            reachable_and_clear(
+                _row_points(x, height, scan, transitions), transitions
+            ).all()
+        )
 
     if all(clear(height) for height in even):
         return even
@@ -230,26 +244,28 @@ def _row_heights(
         tries = np.arange(limit, floor + _ROW_STEP / 2.0, -_ROW_STEP)
         found = next((float(height) for height in tries if clear(height)), None)
         if found is None:
-            points = _row_points(x, limit, scan, linker)
+            points = _row_points(x, limit, scan, transitions)
             what = f"scan row {tile.bottom + limit:.2f} m over the floor"
-            require_reach(points, gun=linker.gun, limits=linker.limits, what=what)
-            q = linker.gun.solve(points)
-            linker.space.require(q, np.zeros(len(q)), what=what)
+            require_reach(
+                points, gun=transitions.gun, limits=transitions.limits, what=what
+            )
+            q = transitions.gun.inverse_kinematics(points)
+            transitions.space.require(q, np.zeros(len(q)), what=what)
         else:
             heights.append(found)
     return heights
 
 
-def _slowed(row: Pass, linker: Linker) -> Pass:
+def _slowed(row: Pass, transitions: TransitionPlanner) -> Pass:
     """Returns the row at the speed that the joints can follow, if that is less.
 
     Close before the base axis a camera moving sideways takes a fast yaw.
     """
     count = int(row.duration * np.linalg.norm(row.v_TG) / _POINT_STEP) + 5
     time = np.linspace(0.0, row.duration, count)
-    v = np.gradient(linker.gun.solve(row.p_TG(time)), time, axis=0)
+    v = np.gradient(transitions.gun.inverse_kinematics(row.p_TG(time)), time, axis=0)
     a = np.gradient(v, time, axis=0)
-    limits = linker.limits
+    limits = transitions.limits
     slower = max(
         1.0,
         float(np.max(np.abs(v) / limits.v_max)) / SEARCH_SHARE,
@@ -259,18 +275,20 @@ def _slowed(row: Pass, linker: Linker) -> Pass:
 
 
 def _row_points(
-    x: FloatArray, height: float, scan: ScanConfig, linker: Linker
+    x: FloatArray, height: float, scan: ScanConfig, transitions: TransitionPlanner
 ) -> FloatArray:
     """Returns nozzle positions (n, 3) along a camera row, m, in T."""
     p_TCs = np.column_stack(
         [x, np.full(x.size, height), np.full(x.size, scan.distance)]
     )
-    return nozzle_under_camera(p_TCs, linker.gun)
+    return nozzle_under_camera(p_TCs, transitions.gun)
 
 
-def standable(p_TGs: FloatArray, linker: Linker) -> np.ndarray:
+def reachable_and_clear(
+    p_TGs: FloatArray, transitions: TransitionPlanner
+) -> np.ndarray:
     """Returns (n,) bool: at which nozzle places (n, 3) the arm keeps clear."""
-    q = linker.gun.solve(p_TGs)
-    good = linker.limits.contains(q)
-    good[good] = linker.space.free(q[good])
+    q = transitions.gun.inverse_kinematics(p_TGs)
+    good = transitions.limits.contains(q)
+    good[good] = transitions.space.free(q[good])
     return np.asarray(good)

@@ -15,7 +15,7 @@ from painter.planning.film.deposition import half_axes
 from painter.planning.film.film_cost import FilmCost, stroke_cost
 from painter.planning.film.film_model import FilmModel, Line, Site
 from painter.planning.strokes.film_fit import FilmFit
-from painter.planning.strokes.slanted import leaning_lines
+from painter.planning.strokes.slanted import slanted_lines
 from painter.planning.strokes.spans import Span
 from perception.ground import BoolArray, FloatArray, IntArray
 
@@ -71,7 +71,7 @@ def find_cut_ins(
     beside = _worth_a_stroke(site, fan) if where is None else where
     lines = [
         (0.0, places),
-        *leaning_lines(site, 2.0 * half_axes(tip, near)[0], spacing),
+        *slanted_lines(site, 2.0 * half_axes(tip, near)[0], spacing),
     ]
     flows = {
         standoff: np.append(

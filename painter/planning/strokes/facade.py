@@ -1,11 +1,11 @@
-"""A wall wider or higher than one tile: stations, and strokes without a seam.
+"""A wall wider or higher than one tile: base positions, and strokes without a seam.
 
-All stations share one grid of lines over the whole wall, and a line belongs to one
-station alone: beside one another they join as the lines of one tile do. Above one
-another strokes end in a ramp, their flow falling in steps over the overlap while that
-of the next station's strokes rises: there an error of place makes a fraction of the
-bead or gap that two blunt ends would make. Where windows and doors are known, lines are
-cut at them, and places with nothing to paint get no station.
+All base positions share one grid of lines over the whole wall, and a line belongs to
+one base_position alone: beside one another they join as the lines of one tile do. Above
+one another strokes end in a ramp, their flow falling in steps over the overlap while
+that of the next base position's strokes rises: there an error of place makes a fraction
+of the bead or gap that two blunt ends would make. Where windows and doors are known,
+lines are cut at them, and places with nothing to paint get no base_position.
 """
 
 import math
@@ -20,26 +20,26 @@ from painter.planning.strokes.stroke_lines import nominal_pitch, wall_share
 from painter.planning.zones import in_zones
 from perception.ground import FloatArray, FrozenValue
 
-_OVERLAP = 0.20  # m, height over which strokes of two stations blend,
+_OVERLAP = 0.20  # m, height over which strokes of two base_positions blend,
 _RAMP_STEPS = 4  # and the steps in which their flow falls and rises.
 _CELL = 0.01  # m, of the grid on which zones are drawn.
 
 
 @dataclass(frozen=True, eq=False)
-class Station(FrozenValue):
+class BasePosition(FrozenValue):
     """One place of the base, and what is painted from there.
 
     Lengths are on the wall: x right and y up from its lower left corner as seen by the
     robot.
 
     Attributes:
-        left: Left edge of the station's tile, m.
+        left: Left edge of the base_position's tile, m.
         bottom: Lower edge, m.
         width: Of the tile, m.
         height: Of the tile, overlaps included, m.
         base_x: Where the base axis stands, m to the right of the wall's left edge.
         lift: How much higher than on the floor the platform stands, m.
-        strokes: In the station's own tile frame T.
+        strokes: In the base_position's own tile frame T.
     """
 
     left: float
@@ -60,7 +60,7 @@ class Station(FrozenValue):
         )
 
 
-def plan_stations(
+def plan_base_positions(
     width: float,
     height: float,
     *,
@@ -68,22 +68,23 @@ def plan_stations(
     tip: TipConfig,
     raster: RasterConfig,
     zones: Sequence[ZoneConfig] = (),
-) -> tuple[Station, ...]:
-    """Divides a wall into stations and lays strokes that join without a seam.
+) -> tuple[BasePosition, ...]:
+    """Divides a wall into base positions and lays strokes that join without a seam.
 
-    What each station finds on its tile cuts its strokes further.
+    What each base position finds on its tile cuts its strokes further.
 
     Args:
         width: Of the wall, m.
         height: Of the wall, m.
-        tile: Largest tile that one station paints, and its height over the floor or
+        tile: Largest tile that one base position paints, and its height over the floor
+        or
             platform that the arm stands on.
         tip: The spray tip.
         raster: Settings of the strokes.
         zones: What of the wall is to be painted or left, on its own axes.
 
     Returns:
-        Stations in order of execution: row by row from below, to and fro.
+        Base positions in order of execution: row by row from below, to and fro.
 
     Raises:
         ValueError: The wall or the tile is too small for a line or an overlap, or
@@ -91,7 +92,7 @@ def plan_stations(
     """
     if raster.coats > 1:
         raise ValueError(
-            f"raster.coats must be 1 for a wall of stations, got {raster.coats!r}."
+            f"raster.coats must be 1 for several base positions, got {raster.coats!r}."
         )
     pitch = nominal_pitch(width, tip=tip, raster=raster)
     lines = round(width / pitch)
@@ -110,7 +111,7 @@ def plan_stations(
     step = (height - _OVERLAP) / rows if rows > 1 else height
     x_lines = pitch * np.arange(0.5, lines)
     painted = _painted(x_lines, width, height, zones, tip=tip, raster=raster)
-    stations: list[Station] = []
+    base_positions: list[BasePosition] = []
     for row in range(rows):
         bottom = row * step
         tall = height if rows == 1 else step + _OVERLAP
@@ -135,8 +136,8 @@ def plan_stations(
             ]
             if not strokes:
                 continue
-            stations.append(
-                Station(
+            base_positions.append(
+                BasePosition(
                     left=float(first * pitch),
                     bottom=bottom,
                     width=float((last - first) * pitch),
@@ -146,7 +147,7 @@ def plan_stations(
                     strokes=tuple(strokes),
                 )
             )
-    return tuple(stations)
+    return tuple(base_positions)
 
 
 def _painted(

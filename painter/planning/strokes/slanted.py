@@ -14,7 +14,7 @@ _STRAIGHT = 1.3
 _LEAST_LEAN = 0.04
 
 
-def leaning_lines(
+def slanted_lines(
     site: Site, reach: float, spacing: float
 ) -> list[tuple[float, FloatArray]]:
     """Returns lines along what leans: their lean and where they meet T y = 0, m.

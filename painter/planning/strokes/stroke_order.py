@@ -51,7 +51,7 @@ def order_strokes(
     )
 
 
-def link_time(
+def transition_time(
     strokes: Sequence[Stroke], p_TG_start: FloatArray, p_TG_end: FloatArray
 ) -> float:
     """Returns the estimated time between strokes in the order given, s."""

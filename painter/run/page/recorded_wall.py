@@ -9,7 +9,7 @@ import numpy as np
 from painter.run.pictures.segmentation_picture import segmentation_picture
 from perception.fine_steps.unseen import Reason
 from perception.io.segmentations import save_segmentation, save_wall_mask
-from perception.paper_steps.pipeline import SegmentationSteps
+from perception.paper_steps.pipeline import SegmentationStages
 from perception.recorded.segment_recorded import RecordedWall
 from perception.recorded.wall_choice import contrast
 from perception.values import Opening, WallSegmentation
@@ -87,11 +87,11 @@ def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
     }
 
 
-def _labels(steps: SegmentationSteps) -> range:
+def _labels(steps: SegmentationStages) -> range:
     return range(1, int(steps.segmentation.labels.max()) + 1)
 
 
-def _region_figures(steps: SegmentationSteps, label: int) -> dict[str, Any]:
+def _region_figures(steps: SegmentationStages, label: int) -> dict[str, Any]:
     result = steps.segmentation
     cells = result.labels == label
     depth = result.depth[cells]

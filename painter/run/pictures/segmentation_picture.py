@@ -9,7 +9,7 @@ from matplotlib.colors import ListedColormap, TwoSlopeNorm
 from matplotlib.patches import Patch, Polygon
 
 from painter.run.pictures import style
-from perception.paper_steps.pipeline import SegmentationSteps
+from perception.paper_steps.pipeline import SegmentationStages
 from perception.values import WallSegmentation
 
 _WALL = "#8fc79a"
@@ -18,7 +18,7 @@ _OTHERS = (style.ORANGE, style.SKY, style.BLUE, style.VERMILION, style.PURPLE)
 _DEPTH_LIMIT = 0.15  # Of the colour scale, m.
 
 
-def segmentation_picture(path: Path, steps: SegmentationSteps, *, title: str) -> None:
+def segmentation_picture(path: Path, steps: SegmentationStages, *, title: str) -> None:
     """Draws the input, the labels, the residuals and the mask side by side.
 
     Args:
@@ -45,7 +45,7 @@ def segmentation_picture(path: Path, steps: SegmentationSteps, *, title: str) ->
     path.write_bytes(style.png(figure, dpi=110))
 
 
-def draw_points(ax: Axes, steps: SegmentationSteps) -> None:
+def draw_points(ax: Axes, steps: SegmentationStages) -> None:
     """Draws the cloud as seen from the robot, coloured by depth.
 
     Args:

@@ -5,7 +5,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import Context
 
 from painter.errors import PainterError
-from painter.planning.scan.free_motion import GOALS, TransferPlanner
+from painter.planning.scan.free_motion import GOALS, FreeMotionPlanner
 from painter.planning.spray_path import Motion
 from painter.planning.tile import nominal_tile_pose
 from painter.systems.ports import EvalAs
@@ -49,7 +49,7 @@ class MotionPlanner(Stage):
     def __init__(
         self,
         *,
-        planner: TransferPlanner,
+        planner: FreeMotionPlanner,
         cell: float = SegmentationConfig.cell,
         period: float,
     ) -> None:

@@ -39,7 +39,7 @@ class Action(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Step:
+class CycleStep:
     """One step: in a phase, an action, and the goal or stage that it names."""
 
     phase: Phase
@@ -48,17 +48,17 @@ class Step:
 
 
 SEQUENCE = (
-    Step(Phase.HOME, Action.MOVE, "home"),
-    Step(Phase.LOOK, Action.MOVE, "look"),
-    Step(Phase.LOOK, Action.HOLD),
-    Step(Phase.LOOK, Action.WORK, "wall_finder"),
-    Step(Phase.SCAN, Action.MOVE, "scan"),
-    Step(Phase.SCAN, Action.MOVE, "more looks"),
-    Step(Phase.SEGMENT, Action.WORK, "wall_segmenter"),
-    Step(Phase.PLAN, Action.WORK, "spray_path_planner"),
-    Step(Phase.REVIEW, Action.REVIEW),
-    Step(Phase.PAINT, Action.PAINT),
-    Step(Phase.RETRACT, Action.MOVE, "retract"),
+    CycleStep(Phase.HOME, Action.MOVE, "home"),
+    CycleStep(Phase.LOOK, Action.MOVE, "look"),
+    CycleStep(Phase.LOOK, Action.HOLD),
+    CycleStep(Phase.LOOK, Action.WORK, "wall_finder"),
+    CycleStep(Phase.SCAN, Action.MOVE, "scan"),
+    CycleStep(Phase.SCAN, Action.MOVE, "more looks"),
+    CycleStep(Phase.SEGMENT, Action.WORK, "wall_segmenter"),
+    CycleStep(Phase.PLAN, Action.WORK, "spray_path_planner"),
+    CycleStep(Phase.REVIEW, Action.REVIEW),
+    CycleStep(Phase.PAINT, Action.PAINT),
+    CycleStep(Phase.RETRACT, Action.MOVE, "retract"),
 )
 # Where the wall is known from before, nothing is looked at.
 KNOWN_WALL_SEQUENCE = tuple(
@@ -159,7 +159,7 @@ class PaintCycle(LeafSystem):
         period: float,
         look_time: float,
         time_limit: float,
-        sequence: Sequence[Step] = SEQUENCE,
+        sequence: Sequence[CycleStep] = SEQUENCE,
     ) -> None:
         """Creates the cycle.
 

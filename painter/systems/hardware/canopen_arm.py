@@ -12,7 +12,7 @@ from pydrake.systems.framework import (
     State,
 )
 
-from painter.canopen.master.feedback import Feedback, Phase
+from painter.canopen.master.feedback import BusState, Feedback
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.robot_clock import Bus, RobotClock
 from painter.errors import BusError
@@ -85,7 +85,7 @@ class CanopenArm(LeafSystem):
         """
         super().__init__()
         report = bus.report()
-        if report is None or report.feedback.phase != Phase.ENABLED:
+        if report is None or report.feedback.phase != BusState.ENABLED:
             raise BusError("the drives are not enabled.")
         self._bus = bus
         self._clock = clock
@@ -171,7 +171,7 @@ class CanopenArm(LeafSystem):
 def arm_status(feedback: Feedback) -> ArmStatus:
     """Returns the bus's feedback as the brain sees it."""
     stopped = feedback.reason
-    if not stopped and feedback.phase != Phase.ENABLED:
+    if not stopped and feedback.phase != BusState.ENABLED:
         stopped = f"the bus is {feedback.phase}."
     return ArmStatus(
         drives=tuple(

@@ -131,14 +131,14 @@ class VoxelMap(FrozenValue):
     def surface_map(self) -> SurfaceMap:
         """Surface points: one a voxel, ghosts left out, sorted by voxel.
 
-        A ghost is a voxel with fewer than `config.min_count` points, or with less than
-        `config.ghost_share` of the points or of the pictures that the best voxel of the
-        3 x 3 columns round it got: a flying pixel or a match gone wrong is not seen
-        again when the camera has moved, a surface is.
+        An outlier is a voxel with fewer than `config.min_count` points, or with less
+        than `config.outlier_share` of the points or of the pictures that the best voxel
+        of the 3 x 3 columns round it got: a flying pixel or a match gone wrong is not
+        seen again when the camera has moved, a surface is.
         """
         keys, counts, frames, sums, camera_sums = self._join_layers()
         column = keys // self._shape[2]
-        share = self.config.ghost_share
+        share = self.config.outlier_share
         real = counts >= self.config.min_count
         real &= counts >= share * self._best_around(column, counts)
         real &= frames >= share * self._best_around(column, frames)

@@ -18,7 +18,7 @@ import numpy as np
 from perception.ground import BoolArray, FloatArray, IntArray
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframes.keyframe import PlaneSight
-from perception.mapping.pose_graph.links import Link
+from perception.mapping.pose_graph.links import PoseConstraint
 from perception.mapping.pose_graph.normal_equations import NormalEquations
 from perception.mapping.pose_graph.observability import information_of
 from perception.mapping.pose_graph.poses import Poses, skew
@@ -80,7 +80,7 @@ class Problem:
     X_WC: Poses
     X_arm: Poses
     has_arm: BoolArray
-    links: list[Link]
+    links: list[PoseConstraint]
     sightings: list[Sighting]
     planes: FloatArray
     numbers: IntArray

@@ -20,13 +20,13 @@ from perception.mapping.pose_graph.graph import (
     Settled,
     Sighting,
 )
-from perception.mapping.pose_graph.links import Link
+from perception.mapping.pose_graph.links import PoseConstraint
 from perception.mapping.pose_graph.observability import (
     observed_directions,
     prior_sigmas,
 )
 from perception.mapping.pose_graph.poses import Poses, angle_deg
-from perception.mapping.pose_graph.registration import find_links, overlap
+from perception.mapping.pose_graph.registration import find_constraints, overlap
 from perception.paper_steps.wall import upright_rotation
 
 _Part = TypeVar("_Part")
@@ -57,7 +57,7 @@ class KeyframeGraph(FrozenValue):
     config: PoseGraphConfig
     keyframes: tuple[Keyframe, ...]
     poses: tuple[RigidTransform, ...]
-    links: tuple[Link, ...]
+    links: tuple[PoseConstraint, ...]
     sightings: tuple[Sighting, ...]
     planes: FloatArray
     sighted: IntArray
@@ -118,7 +118,7 @@ class KeyframeGraph(FrozenValue):
         self,
         keyframe: Keyframe,
         X_WC: RigidTransform,
-        links: list[Link] | None = None,
+        links: list[PoseConstraint] | None = None,
     ) -> Self:
         """Returns the graph with a keyframe more.
 
@@ -135,7 +135,7 @@ class KeyframeGraph(FrozenValue):
             base=self.base.followed_by(base),
         )
         if links is None:
-            links = find_links(
+            links = find_constraints(
                 grown.keyframes, grown.poses, self.intrinsics, self.config
             )
         planes, sightings = list(self.planes), list(self.sightings)

@@ -30,7 +30,7 @@ _RATIO = 0.85
 """Lowe's: the best match is so much better than the second."""
 
 
-class LinkKind(enum.StrEnum):
+class ConstraintKind(enum.StrEnum):
     """How a link was found."""
 
     APPEARANCE = "appearance"
@@ -38,7 +38,7 @@ class LinkKind(enum.StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Link(FrozenValue):
+class PoseConstraint(FrozenValue):
     """A measured pose of keyframe j in keyframe i.
 
     Attributes:
@@ -53,7 +53,7 @@ class Link(FrozenValue):
 
     i: int
     j: int
-    kind: LinkKind
+    kind: ConstraintKind
     X_ij: RigidTransform
     information: FloatArray
     inliers: int
@@ -85,13 +85,13 @@ def floored(
     return np.asarray((axes * capped) @ axes.T * np.outer(scale, scale))
 
 
-def link_by_appearance(
+def constraint_by_appearance(
     a: Features,
     b: Features,
     intrinsics: CameraIntrinsics,
     config: PoseGraphConfig,
     ends: tuple[int, int],
-) -> tuple[Link | None, int]:
+) -> tuple[PoseConstraint | None, int]:
     """Matches corners, finds the pose by PnP and refines it.
 
     Args:
@@ -141,7 +141,9 @@ def link_by_appearance(
     X_ij, information = _refine(
         X_ji.inverse(), a, b, first[kept], second[kept], intrinsics, config
     )
-    link = Link(*ends, LinkKind.APPEARANCE, X_ij, floored(information, config), count)
+    link = PoseConstraint(
+        *ends, ConstraintKind.APPEARANCE, X_ij, floored(information, config), count
+    )
     return link, count
 
 
@@ -200,14 +202,14 @@ def _refine(
     return X_ij, information
 
 
-def link_by_geometry(
+def constraint_by_geometry(
     a: PointGrid,
     b: PointGrid,
     X_ij: RigidTransform,
     intrinsics: CameraIntrinsics,
     config: PoseGraphConfig,
     ends: tuple[int, int],
-) -> Link | None:
+) -> PoseConstraint | None:
     """Registers points to planes, along the directions that the normals determine.
 
     Source: Chen and Medioni, "Object modelling by registration of multiple range
@@ -261,7 +263,7 @@ def link_by_geometry(
     determined = kept @ kept.T @ information @ kept @ kept.T
     information = determined * np.outer(scale, scale) / (4.0 * max(rms, 5e-4) ** 2)
     honest = to_center.T @ floored(information, config, _NUMERICAL) @ to_center
-    return Link(*ends, LinkKind.GEOMETRY, X_ij, honest, count)
+    return PoseConstraint(*ends, ConstraintKind.GEOMETRY, X_ij, honest, count)
 
 
 def _correspond(

@@ -9,10 +9,10 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframes.keyframe import Keyframe
 from perception.mapping.pose_graph.links import (
-    Link,
-    LinkKind,
-    link_by_appearance,
-    link_by_geometry,
+    ConstraintKind,
+    PoseConstraint,
+    constraint_by_appearance,
+    constraint_by_geometry,
 )
 from perception.mapping.pose_graph.poses import angle_deg
 
@@ -47,12 +47,12 @@ def overlap(
     return float(inside.mean())
 
 
-def find_links(
+def find_constraints(
     keyframes: Sequence[Keyframe],
     poses: Sequence[RigidTransform],
     intrinsics: CameraIntrinsics,
     config: PoseGraphConfig,
-) -> list[Link]:
+) -> list[PoseConstraint]:
     """Registers the last keyframe to those before it and to older ones it overlaps.
 
     Args:
@@ -99,17 +99,17 @@ def _register(
     intrinsics: CameraIntrinsics,
     config: PoseGraphConfig,
     ends: tuple[int, int],
-) -> Link | None:
+) -> PoseConstraint | None:
     """Links two keyframes by appearance, or else by geometry."""
-    link, _ = link_by_appearance(a.features, b.features, intrinsics, config, ends)
+    link, _ = constraint_by_appearance(a.features, b.features, intrinsics, config, ends)
     if link is None:
         grids = a.grid(intrinsics), b.grid(intrinsics)
-        link = link_by_geometry(*grids, guess, intrinsics, config, ends)
+        link = constraint_by_geometry(*grids, guess, intrinsics, config, ends)
     if link is None:
         return None
     off = guess.inverse() @ link.X_ij
     arm = a.X_arm is not None and b.X_arm is not None
-    if (arm or link.kind is LinkKind.GEOMETRY) and (
+    if (arm or link.kind is ConstraintKind.GEOMETRY) and (
         np.linalg.norm(off.translation()) > _GATE
         or angle_deg(off.rotation()) > _GATE_DEG
     ):

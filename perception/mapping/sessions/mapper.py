@@ -17,7 +17,11 @@ from perception.mapping.keyframes.keyframe import Keyframe, find_features, make_
 from perception.mapping.keyframes.view import Features
 from perception.mapping.keyframes.working_set import WorkingSet
 from perception.mapping.pose_graph.keyframe_graph import KeyframeGraph, Solution
-from perception.mapping.pose_graph.links import Link, LinkKind, link_by_appearance
+from perception.mapping.pose_graph.links import (
+    ConstraintKind,
+    PoseConstraint,
+    constraint_by_appearance,
+)
 
 _PATIENCE = 10
 """Frames that may be lost before a map without poses is given up."""
@@ -175,7 +179,11 @@ class Mapper:
         return Outcome.KEYFRAME
 
     def restore(
-        self, frame: Frame, number: int, X_WC: RigidTransform, links: list[Link]
+        self,
+        frame: Frame,
+        number: int,
+        X_WC: RigidTransform,
+        links: list[PoseConstraint],
     ) -> None:
         """Takes a keyframe back from a store, with the links that were found then."""
         features = find_features(frame, self._intrinsics, self.config)
@@ -183,7 +191,10 @@ class Mapper:
         self.add_keyframe(keyframe, X_WC, links)
 
     def add_keyframe(
-        self, keyframe: Keyframe, X_WC: RigidTransform, links: list[Link] | None = None
+        self,
+        keyframe: Keyframe,
+        X_WC: RigidTransform,
+        links: list[PoseConstraint] | None = None,
     ) -> None:
         """Takes a keyframe.
 
@@ -200,12 +211,12 @@ class Mapper:
         if index and index % self.config.optimize_every == 0:
             self.graph = self.graph.settled(self._working_set.members)
 
-    def _track(self, features: Features) -> Link | None:
+    def _track(self, features: Features) -> PoseConstraint | None:
         """Finds a frame by appearance among the last keyframes."""
         self._best_inliers = 0
         keyframes = self.graph.keyframes
         for index in reversed(range(max(0, len(keyframes) - 3), len(keyframes))):
-            link, inliers = link_by_appearance(
+            link, inliers = constraint_by_appearance(
                 keyframes[index].features,
                 features,
                 self._intrinsics,
@@ -217,7 +228,9 @@ class Mapper:
                 return link
         return None
 
-    def _predict(self, frame: Frame, tracked: Link | None) -> RigidTransform | None:
+    def _predict(
+        self, frame: Frame, tracked: PoseConstraint | None
+    ) -> RigidTransform | None:
         """Returns where the frame was taken, or None if nothing tells."""
         if tracked is not None:
             return self.graph.poses[tracked.i] @ tracked.X_ij
@@ -230,7 +243,7 @@ class Mapper:
         ratios = []
         for link in self.graph.links:
             a, b = (self.graph.keyframes[k].X_arm for k in (link.i, link.j))
-            if link.kind is not LinkKind.APPEARANCE or a is None or b is None:
+            if link.kind is not ConstraintKind.APPEARANCE or a is None or b is None:
                 continue
             by_arm = np.linalg.norm((a.inverse() @ b).translation())
             if by_arm > _FAR:

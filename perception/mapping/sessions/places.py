@@ -12,7 +12,7 @@ from perception.errors import PerceptionError
 from perception.mapping.keyframes.keyframe import Keyframe
 from perception.mapping.keyframes.view import Features
 from perception.mapping.pose_graph.keyframe_graph import KeyframeGraph
-from perception.mapping.pose_graph.links import link_by_appearance
+from perception.mapping.pose_graph.links import constraint_by_appearance
 from perception.mapping.pose_graph.poses import angle_deg
 
 _TABLES = 12
@@ -110,7 +110,7 @@ def localise(known: KeyframeGraph, session: KeyframeGraph) -> Localisation:
     for number, keyframe in enumerate(session.keyframes):
         X_NC = session.poses[number]
         for k in places.likely(keyframe.features, _CANDIDATES):
-            link, _ = link_by_appearance(
+            link, _ = constraint_by_appearance(
                 known.keyframes[k].features,
                 keyframe.features,
                 known.intrinsics,

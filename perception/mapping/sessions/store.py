@@ -20,7 +20,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.errors import CloudReadError
 from perception.io.frames import Frame
 from perception.mapping.config import MapperConfig
-from perception.mapping.pose_graph.links import Link, LinkKind
+from perception.mapping.pose_graph.links import ConstraintKind, PoseConstraint
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS info (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -95,7 +95,12 @@ class MapStore:
         return None if config is None else MapperConfig(**config)
 
     def save_keyframe(
-        self, k: int, number: int, frame: Frame, X_WC: RigidTransform, links: list[Link]
+        self,
+        k: int,
+        number: int,
+        frame: Frame,
+        X_WC: RigidTransform,
+        links: list[PoseConstraint],
     ) -> None:
         """Keeps a keyframe with its pictures and its links to older ones."""
         with self._db:
@@ -165,7 +170,9 @@ class MapStore:
                 list(enumerate(seconds)),
             )
 
-    def keyframes(self) -> Iterator[tuple[int, Frame, RigidTransform, list[Link]]]:
+    def keyframes(
+        self,
+    ) -> Iterator[tuple[int, Frame, RigidTransform, list[PoseConstraint]]]:
         """Reads the keyframes: number of the frame, the frame, its pose and links."""
         rows = self._db.execute(
             "SELECT k, number, time, depth, color, arm, pose FROM keyframes ORDER BY k"
@@ -183,15 +190,15 @@ class MapStore:
         (count,) = self._db.execute("SELECT COUNT(*) FROM keyframes").fetchone()
         return int(count)
 
-    def _links(self, j: int) -> list[Link]:
+    def _links(self, j: int) -> list[PoseConstraint]:
         rows = self._db.execute(
             "SELECT i, kind, inliers, pose, information FROM links WHERE j = ?", (j,)
         )
         return [
-            Link(
+            PoseConstraint(
                 i=i,
                 j=j,
-                kind=LinkKind(kind),
+                kind=ConstraintKind(kind),
                 X_ij=_pose(pose),
                 information=np.frombuffer(information).reshape(6, 6).copy(),
                 inliers=inliers,

@@ -10,7 +10,7 @@ import yaml
 
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.config.device import Mode
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.protocol.cia402 import State
 from painter.canopen.sim.rack import Fault
 from painter.errors import InputError
@@ -100,8 +100,8 @@ def test_each_maker_stops_with_the_others(makers, axis):
     assert lab.rack.io.outputs == 0
     lab.path = None
     lab.master.acknowledge()
-    lab.until(lambda: lab.master.phase != Phase.STARTING)
-    assert lab.master.phase == Phase.ENABLED, lab.master.reason
+    lab.until(lambda: lab.master.phase != BusState.STARTING)
+    assert lab.master.phase == BusState.ENABLED, lab.master.reason
 
 
 def test_a_value_beyond_the_drives_range_is_refused(make_lab, tmp_path):
@@ -139,7 +139,7 @@ def test_homing_that_takes_too_long_stops(make_lab, tmp_path):
     lab = make_lab(load_bus(write_bus(tmp_path, {"base_yaw": {"homing": homing}})))
     lab.rack.drives["base_yaw"]._home_switch = 1e6
     lab.master.start()
-    lab.until(lambda: lab.master.phase != Phase.STARTING)
+    lab.until(lambda: lab.master.phase != BusState.STARTING)
     assert "base_yaw: homing 1 not done within 1 s" in lab.master.reason
     lab.run(0.5)
     assert lab.rack.drives["base_yaw"].state == State.QUICK_STOP
@@ -151,7 +151,7 @@ def test_a_value_that_reads_back_differently_ends_bring_up(make_lab):
     # A drive that rounds its ramp and says nothing.
     store.written = lambda i, sub, v: i == 0x6085 and store.set(i, sub, int(v) // 2)
     lab.master.start()
-    lab.until(lambda: lab.master.phase != Phase.STARTING)
+    lab.until(lambda: lab.master.phase != BusState.STARTING)
     assert "elbow_pitch: quick stop deceleration (6085h:0) was written" in (
         lab.master.reason
     )

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from painter.canopen.config.bus_file import load_bus
-from painter.canopen.master.feedback import Phase
+from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import BusProcess
 from painter.canopen.process.mailbox import Mailbox
 from painter.canopen.wire.candump import read_log
-from painter.canopen.wire.links import LinkError, LocalLink
+from painter.canopen.wire.links import LocalTransport, TransportError
 from painter.errors import BusError
 from painter.resources import models_path
 
@@ -59,8 +59,8 @@ def drives(bus):
 
     def is_there():
         try:
-            LocalLink(bus.channel).close()
-        except LinkError:
+            LocalTransport(bus.channel).close()
+        except TransportError:
             assert process.poll() is None, process.stderr.read()
             return False
         return True
@@ -83,7 +83,7 @@ def phase_is(process, phase):
 def test_the_arm_moves_and_switches_off(bus, drives):
     with BusProcess(bus) as dut:
         dut.start()
-        report = wait_for(phase_is(dut, Phase.ENABLED), "not enabled")
+        report = wait_for(phase_is(dut, BusState.ENABLED), "not enabled")
         q0, start = report.feedback.q, time.monotonic() + 0.2
         goal, duration = np.array([0.1, 0.1, 0.1, 0.1, -0.1]), 0.5
         points = []
@@ -97,12 +97,12 @@ def test_the_arm_moves_and_switches_off(bus, drives):
             lambda: np.allclose(dut.report().feedback.q, q0 + goal, atol=1e-3),
             "the goal is not reached",
         )
-        assert dut.report().feedback.phase == Phase.ENABLED
+        assert dut.report().feedback.phase == BusState.ENABLED
         dut.stop("a test says so.")
-        wait_for(phase_is(dut, Phase.STOPPED), "not stopped")
+        wait_for(phase_is(dut, BusState.STOPPED), "not stopped")
         assert dut.report().feedback.reason == "a test says so."
         dut.acknowledge()
-        wait_for(phase_is(dut, Phase.ENABLED), "not enabled again")
+        wait_for(phase_is(dut, BusState.ENABLED), "not enabled again")
     assert not dut.is_alive
 
 
@@ -126,11 +126,11 @@ def test_the_arm_stops_when_the_commanding_program_is_killed(bus, drives, tmp_pa
     code = textwrap.dedent("""
         import pickle, sys, time
         from painter.canopen.process.bus_process import BusProcess
-        from painter.canopen.master.feedback import Phase
+        from painter.canopen.master.feedback import BusState
         if __name__ == "__main__":
             dut = BusProcess(pickle.loads(sys.stdin.buffer.read()))
             dut.start()
-            while not ((r := dut.report()) and r.feedback.phase == Phase.ENABLED):
+            while not ((r := dut.report()) and r.feedback.phase == BusState.ENABLED):
                 time.sleep(0.01)
             print(dut.pid, flush=True)
             time.sleep(1000)
@@ -167,7 +167,7 @@ def test_drives_stop_and_the_log_is_whole_when_the_bus_process_is_killed(
     log = tmp_path / "bus.log"
     dut = BusProcess(bus, log=log)
     dut.start()
-    wait_for(phase_is(dut, Phase.ENABLED), "not enabled")
+    wait_for(phase_is(dut, BusState.ENABLED), "not enabled")
     os.kill(dut.pid, signal.SIGKILL)
     wait_for(lambda: not dut.is_alive, "still alive")
     with pytest.raises(BusError, match="has ended"):

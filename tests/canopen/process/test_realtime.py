@@ -125,5 +125,5 @@ def test_a_niceness_that_may_not_be_had_is_no_error(monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(os, "setpriority", refuse)
-    realtime.prefer(-18)
+    realtime.set_niceness(-18)
     assert asked == [(os.PRIO_PROCESS, 0, -18)]

@@ -8,7 +8,7 @@ import pytest
 
 from painter.canopen.protocol.frames import Frame
 from painter.canopen.wire.candump import read_log
-from painter.canopen.wire.frame_log import FrameLogger, TappedLink
+from painter.canopen.wire.frame_log import FrameLogger, TappedTransport
 from painter.errors import InputError
 
 
@@ -35,7 +35,7 @@ class Loop:
 def test_frames_of_both_ways_are_written_in_order(tmp_path):
     path = tmp_path / "bus.log"
     logger = FrameLogger(path, "can 0")
-    dut = TappedLink(Loop(), logger.pipe)
+    dut = TappedTransport(Loop(), logger.pipe)
     error = Frame(0x40, bytes(8), is_error=True)
     before = time.time()
     for i in range(500):
@@ -60,7 +60,7 @@ def test_frames_of_both_ways_are_written_in_order(tmp_path):
 
 def test_a_writer_that_does_not_read_never_holds_up_the_bus():
     read, write = Pipe(duplex=False)
-    dut = TappedLink(Loop(), write)
+    dut = TappedTransport(Loop(), write)
     start = time.monotonic()
     for _ in range(20_000):
         dut.send(Frame(0x80))
@@ -85,7 +85,7 @@ def test_a_writer_that_does_not_read_never_holds_up_the_bus():
 
 def test_a_writer_that_is_gone_does_not_end_the_bus():
     read, write = Pipe(duplex=False)
-    dut = TappedLink(Loop(), write)
+    dut = TappedTransport(Loop(), write)
     read.close()
     dut.send(Frame(0x80))
     assert dut.receive(0.001) == [Frame(0x80)]

@@ -21,7 +21,7 @@ _PROGRAM = textwrap.dedent("""
     import numpy as np
     from painter.canopen.config.bus_file import load_bus
     from painter.canopen.process.bus_process import BusProcess
-    from painter.canopen.master.feedback import Phase
+    from painter.canopen.master.feedback import BusState
     from painter.canopen.master.setpoints import Setpoint
     from painter.resources import models_path
 
@@ -47,7 +47,7 @@ _PROGRAM = textwrap.dedent("""
         bus.io = dataclasses.replace(bus.io, deadline=4.0)
         with BusProcess(bus) as dut:
             dut.start()
-            q0 = wait_for(dut, Phase.ENABLED).q
+            q0 = wait_for(dut, BusState.ENABLED).q
             start, points = dut.now() + 0.3, []
             for i in range(51):
                 s = i / 50
@@ -57,7 +57,7 @@ _PROGRAM = textwrap.dedent("""
             while np.abs(dut.report().feedback.q - q0 - 0.1).max() > 1e-3:
                 time.sleep(0.01)
             feedback = dut.report().feedback
-            assert feedback.phase == Phase.ENABLED, feedback.reason
+            assert feedback.phase == BusState.ENABLED, feedback.reason
             # Own frames come back with UDP; none of them was taken for a node's.
             assert feedback.statistics.foreign == 0, feedback.statistics
         drives.send_signal(signal.SIGINT)

@@ -6,7 +6,12 @@ import pytest
 from painter.canopen.protocol.frames import Frame, frame_bits, frame_time
 from painter.canopen.sim.server import LocalHub
 from painter.canopen.sim.wire import Wire
-from painter.canopen.wire.links import CanLink, LinkError, LocalLink, unpack_frame
+from painter.canopen.wire.links import (
+    LocalTransport,
+    PythonCanTransport,
+    TransportError,
+    unpack_frame,
+)
 
 
 @pytest.mark.parametrize(
@@ -38,7 +43,7 @@ def test_a_slower_wire_takes_longer():
 
 def test_frames_pass_a_python_can_interface():
     channel = uuid.uuid4().hex
-    dut = CanLink("virtual", channel, 1_000_000)
+    dut = PythonCanTransport("virtual", channel, 1_000_000)
     with can.Bus(interface="virtual", channel=channel) as other:
         dut.send(Frame(0x123, b"abc"))
         message = other.recv(1.0)
@@ -54,21 +59,21 @@ def test_frames_pass_a_python_can_interface():
         assert frames[-1] == Frame(5, b"x")
         assert [frame.is_error for frame in frames] == [True, False]
     dut.close()
-    with pytest.raises(LinkError, match="closed"):
+    with pytest.raises(TransportError, match="closed"):
         dut.send(Frame(1))
 
 
 def test_an_interface_that_is_not_there_is_named():
-    with pytest.raises(LinkError, match="no_such_thing can7"):
-        CanLink("no_such_thing", "can7", 1_000_000)
+    with pytest.raises(TransportError, match="no_such_thing can7"):
+        PythonCanTransport("no_such_thing", "can7", 1_000_000)
 
 
 def test_local_sockets_join_all_who_connect(tmp_path):
     path = str(tmp_path / "bus")
-    with pytest.raises(LinkError, match="local"):
-        LocalLink(path)
+    with pytest.raises(TransportError, match="local"):
+        LocalTransport(path)
     hub = LocalHub(path)
-    a, b = LocalLink(path), LocalLink(path)
+    a, b = LocalTransport(path), LocalTransport(path)
     hub.receive(0.1)
     hub.receive(0.1)
     a.send(Frame(0x701, b"\5"))
@@ -80,9 +85,9 @@ def test_local_sockets_join_all_who_connect(tmp_path):
     b.close()
     hub.receive(0.1)
     hub.close()
-    with pytest.raises(LinkError, match="closed"):
+    with pytest.raises(TransportError, match="closed"):
         a.receive(1.0)
-    with pytest.raises(LinkError):
+    with pytest.raises(TransportError):
         a.reopen()
 
 

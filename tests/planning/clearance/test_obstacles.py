@@ -50,16 +50,16 @@ def test_frame_is_covered_without_filling_what_it_encloses(make_wall):
 def test_clearance_from_a_box_is_the_one_asked_for(robot, gap, free):
     # The nozzle is the foremost point of the arm: 0.3 m before the wall.
     box = ObstacleBox("box", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.1, 0.3 - gap]))
-    linker = robot.linker(box)
-    q = linker.gun.solve(np.array([[1.0, 1.0, 0.3]]))
-    assert linker.space.free(q).tolist() == [free]
+    transitions = robot.transitions(box)
+    q = transitions.gun.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
+    assert transitions.space.free(q).tolist() == [free]
 
 
 def test_boxes_of_one_wall_do_not_stay_for_the_next(robot):
-    q = robot.linker().gun.solve(np.array([[1.0, 1.0, 0.3]]))
+    q = robot.transitions().gun.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
     box = ObstacleBox("box", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.1, 0.35]))
-    assert not robot.linker(box).space.all_free(q)
-    assert robot.linker().space.all_free(q)
+    assert not robot.transitions(box).space.all_free(q)
+    assert robot.transitions().space.all_free(q)
 
 
 def test_collision_names_motion_time_and_bodies(robot):
@@ -70,7 +70,9 @@ def test_collision_names_motion_time_and_bodies(robot):
         clearance=0.04,
         floor_clearance=0.01,
     )
-    q = robot.linker().gun.solve(np.array([[1.0, 1.0, 0.6], [1.0, 1.0, 0.3]]))
+    q = robot.transitions().gun.inverse_kinematics(
+        np.array([[1.0, 1.0, 0.6], [1.0, 1.0, 0.3]])
+    )
     with pytest.raises(CollisionError, match=r"test: gun and surroundings.* 2\.50 s"):
         space.require(q, np.array([1.0, 2.5]), what="test")
 
@@ -84,14 +86,14 @@ def test_one_blocked_place_among_many_is_found_wherever_it_is(robot, where):
         np.array([0.99, y[where] - 0.005, 0.0]),
         np.array([1.01, y[where] + 0.005, 0.27]),
     )
-    linker = robot.linker(post)
+    transitions = robot.transitions(post)
     heights = np.full(41, 0.5)
     heights[where] = 0.3
-    q = linker.gun.solve(np.column_stack([np.ones(41), y, heights]))
+    q = transitions.gun.inverse_kinematics(np.column_stack([np.ones(41), y, heights]))
     time = np.linspace(0.0, 4.0, 41)
     others = np.arange(41) != where
-    assert linker.space.all_free(q[others])
-    assert not linker.space.all_free(q)
-    linker.space.require(q[others], time[others], what="test")
+    assert transitions.space.all_free(q[others])
+    assert not transitions.space.all_free(q)
+    transitions.space.require(q[others], time[others], what="test")
     with pytest.raises(CollisionError, match=f"at {time[where]:.2f} s"):
-        linker.space.require(q, time, what="test")
+        transitions.space.require(q, time, what="test")

@@ -5,7 +5,7 @@ import numpy as np
 from painter.planning.clearance.obstacles import ObstacleBox
 from painter.planning.clearance.tool_shape import standoffs_beside, tool_boxes
 from painter.planning.config import MotionConfig, TileConfig
-from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.gun_path import WallIk
 from painter.planning.tile import nominal_tile_pose
 
 BOX = ObstacleBox("box", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.0, 0.15]))
@@ -27,9 +27,9 @@ def least_standoffs(robot, *run_out):
 
 
 def free(robot, x, y, standoff):
-    gun = SquareGun(robot.kinematics, nominal_tile_pose(TileConfig()))
+    gun = WallIk(robot.kinematics, nominal_tile_pose(TileConfig()))
     places = np.stack(np.broadcast_arrays(*np.atleast_1d(x, y, standoff)), axis=-1)
-    return robot.linker(BOX).space.free(gun.solve(places))
+    return robot.transitions(BOX).space.free(gun.inverse_kinematics(places))
 
 
 def test_gun_and_camera_keep_clear_from_there_on_and_not_from_nearer(robot):

@@ -7,8 +7,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from painter.planning.motion.blend import MovingState
 from painter.planning.motion.gun_path import (
     Pass,
-    SquareGun,
     ToolMove,
+    WallIk,
     fastest_tool_blend,
 )
 from painter.planning.motion.joint_motion import planning_limits
@@ -18,7 +18,7 @@ UP = np.array([0.0, 0.6, 0.0])
 
 @pytest.fixture
 def gun(robot):
-    return robot.linker().gun
+    return robot.transitions().gun
 
 
 def test_pass_runs_from_point_to_point_at_its_speed():
@@ -39,7 +39,7 @@ def test_gun_is_square_to_a_wall_that_is_not_plumb(robot, gun):
     X_WT = tilt @ gun.X_WT
     p_TGs = np.array([[0.3, 0.4, 0.3], [1.0, 1.0, 0.3], [1.7, 1.8, 0.5]])
     R_WGs, p_WGs = robot.kinematics.gun_poses(
-        SquareGun(robot.kinematics, X_WT).solve(p_TGs)
+        WallIk(robot.kinematics, X_WT).inverse_kinematics(p_TGs)
     )
     np.testing.assert_allclose(p_WGs, (X_WT @ p_TGs.T).T, atol=1e-9)
     np.testing.assert_allclose(
@@ -104,12 +104,12 @@ def test_hop_leaves_and_meets_the_passes_smoothly(robot, gun):
 )
 def test_peaks_between_the_samples_of_the_search_are_seen(robot, x, y, gap, hop, rise):
     limits = planning_limits(robot.limits, 0.9)
-    linker = robot.linker()
+    transitions = robot.transitions()
     start, end = (MovingState.steady([x, y + d, 0.3], UP) for d in (0.0, gap))
     blend = fastest_tool_blend(
-        start, end, gun=linker.gun, limits=limits, hop=hop, rise=rise
+        start, end, gun=transitions.gun, limits=limits, hop=hop, rise=rise
     )
     time, step = np.linspace(0.0, blend.duration, 2001, retstep=True)
-    q = ToolMove(blend, linker.gun).q(time)
+    q = ToolMove(blend, transitions.gun).q(time)
     peak = np.abs(np.diff(q, 2, axis=0)).max(axis=0) / step**2
     assert (peak <= 1.005 * limits.a_max).all()  # 1.09 before it was looked at twice.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from painter.planning.config import TileConfig
-from painter.planning.motion.gun_path import SquareGun
+from painter.planning.motion.gun_path import WallIk
 from painter.planning.motion.reach import nearest_standoffs, wrist_distances
 from painter.planning.tile import nominal_tile_pose
 
@@ -12,7 +12,7 @@ RUN_OUT = 0.10  # m beyond a stroke's end.
 
 
 def test_strokes_start_farther_off_where_the_arm_would_have_to_stretch(robot):
-    gun = SquareGun(robot.kinematics, nominal_tile_pose(TileConfig()))
+    gun = WallIk(robot.kinematics, nominal_tile_pose(TileConfig()))
     dut = nearest_standoffs(
         X, X, gun=gun, limits=robot.limits, near=0.06, far=0.315, stopping=0.10
     )

@@ -21,20 +21,20 @@ UP = np.array([0.0, 0.6, 0.0])
 TALL = ObstacleBox("tall", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.0, 0.32]))
 
 
-def nozzle(linker, segment):
+def nozzle(transitions, segment):
     """Places of the nozzle in T along a segment, (n, 3) m."""
     q = segment.q(np.linspace(0.0, segment.duration, 400))
-    _, p_WGs = linker.gun.kinematics.gun_poses(q)
-    return (linker.gun.X_WT.inverse() @ p_WGs.T).T
+    _, p_WGs = transitions.gun.kinematics.gun_poses(q)
+    return (transitions.gun.X_WT.inverse() @ p_WGs.T).T
 
 
 def test_hop_clears_a_tall_box_between_two_strokes(robot):
-    linker = robot.linker(TALL)
+    transitions = robot.transitions(TALL)
     start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
     end = MovingState.steady(np.array([1.0, 1.25, 0.3]), UP)
-    (move,) = linker.between(start, end)
+    (move,) = transitions.connect(start, end)
     assert isinstance(move, ToolMove)
-    places = nozzle(linker, move)
+    places = nozzle(transitions, move)
     over = (places[:, 1] > 0.9) & (places[:, 1] < 1.0)
     assert over.any()
     assert places[over, 2].min() > 0.32 + 0.04  # Its top and the clearance.
@@ -42,12 +42,12 @@ def test_hop_clears_a_tall_box_between_two_strokes(robot):
 
 
 def test_nothing_in_the_way_needs_no_hop(robot):
-    linker = robot.linker()
+    transitions = robot.transitions()
     start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
     end = MovingState.steady(np.array([1.0, 1.25, 0.3]), UP)
-    (move,) = linker.between(start, end)
+    (move,) = transitions.connect(start, end)
     assert move.duration < 1.0  # 0.6 m at 0.6 m/s, or faster.
-    assert nozzle(linker, move)[:, 2].min() > 0.25
+    assert nozzle(transitions, move)[:, 2].min() > 0.25
 
 
 # Corners at the top; at the bottom, where the floor is near, one line further in.
@@ -62,15 +62,15 @@ def test_nothing_in_the_way_needs_no_hop(robot):
     ],
 )
 def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
-    linker = robot.linker()
+    transitions = robot.transitions()
     start = MovingState.steady(np.array([x, y, 0.3]), sign * UP)
     step = 0.13 if x < 1.5 else -0.13
     end = MovingState.steady(np.array([x + step, y, 0.3]), -sign * UP)
-    moves = linker.between(start, end)
+    moves = transitions.connect(start, end)
     assert len(moves) == 1
     (turn,) = moves
-    np.testing.assert_allclose(start_q(turn), linker.gun.joint_states(start)[0].x)
-    np.testing.assert_allclose(end_q(turn), linker.gun.joint_states(end)[0].x)
+    np.testing.assert_allclose(start_q(turn), transitions.gun.joint_states(start)[0].x)
+    np.testing.assert_allclose(end_q(turn), transitions.gun.joint_states(end)[0].x)
     # The gun is square all along the turn: pitches and yaws add up to zero.
     q = turn.q(np.linspace(0.0, turn.duration, 100))
     np.testing.assert_allclose(q[:, 1:4].sum(axis=1), 0.0, atol=1e-6)
@@ -80,7 +80,7 @@ def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
 @pytest.mark.parametrize("box", [None, TALL])
 def test_the_quickest_clear_move_is_taken(robot, box):
     """All that are tried, each found by itself, in the order of their durations."""
-    linker = robot.linker(*([] if box is None else [box]))
+    transitions = robot.transitions(*([] if box is None else [box]))
     hops = [0.0] if box is None else [0.0, 0.10]
     ways = ((0.87, -1.0), (1.0, 1.0), (1.07, 1.0), (1.16, -1.0))
     for x, way in ways if box is None else ((1.0, 1.0), (1.05, 1.0)):
@@ -90,43 +90,52 @@ def test_the_quickest_clear_move_is_taken(robot, box):
         for hop in hops:
             blends = [
                 fastest_tool_blend(
-                    start, end, gun=linker.gun, limits=linker.limits, hop=hop, rise=rise
+                    start,
+                    end,
+                    gun=transitions.gun,
+                    limits=transitions.limits,
+                    hop=hop,
+                    rise=rise,
                 )
                 for rise in ((0.5, 0.35, 0.25, 0.15) if hop else (0.5,))
             ]
-            moves = [ToolMove(blend, linker.gun) for blend in blends if blend]
+            moves = [ToolMove(blend, transitions.gun) for blend in blends if blend]
             if not hop:
-                states = linker.gun.joint_states(start, end)
-                moves.append(fastest_joint_blend(*states, linker.limits))
-            by_hop.append([move.duration for move in moves if linker.clear(move)])
+                states = transitions.gun.joint_states(start, end)
+                moves.append(fastest_joint_blend(*states, transitions.limits))
+            by_hop.append([move.duration for move in moves if transitions.clear(move)])
         durations = next(durations for durations in by_hop if durations)
         for _ in range(2):  # Asked again it is the same.
-            (move,) = linker.between(start, end)
+            (move,) = transitions.connect(start, end)
             assert move.duration == min(durations)
 
 
 def test_transit_goes_round_what_blocks_the_straight_way(robot):
     wall = ObstacleBox("rib", np.array([0.95, 0.0, 0.0]), np.array([1.05, 2.0, 0.40]))
-    linker = robot.linker(wall)
-    q0, q1 = linker.gun.solve(np.array([[0.5, 1.0, 0.3], [1.5, 1.0, 0.3]]))
-    legs = linker.transit(q0, q1)
+    transitions = robot.transitions(wall)
+    q0, q1 = transitions.gun.inverse_kinematics(
+        np.array([[0.5, 1.0, 0.3], [1.5, 1.0, 0.3]])
+    )
+    legs = transitions.free_motion(q0, q1)
     assert len(legs) > 1
     np.testing.assert_allclose(start_q(legs[0]), q0)
     np.testing.assert_allclose(end_q(legs[-1]), q1)
-    assert all(linker.clear(leg) for leg in legs)
+    assert all(transitions.clear(leg) for leg in legs)
 
 
 @pytest.mark.parametrize("height", [0.0, 0.12, 0.3, 0.40])
 @pytest.mark.parametrize("y", [-0.1, 0.4, 1.0, 1.9])
 def test_transit_is_the_quickest_of_all_clear_ways(robot, height, y):
     wall = ObstacleBox("rib", np.array([0.95, 0.0, 0.0]), np.array([1.05, 2.0, height]))
-    linker = robot.linker(wall)
-    q0, q1 = linker.gun.solve(np.array([[0.5, y, 0.18], [1.5, y, 0.3]]))
-    fold, unfold = (linker._folded(float(q[0])) for q in (q0, q1))
-    back, forth = (linker._drawn_back(q) for q in (q0, q1))
+    transitions = robot.transitions(wall)
+    q0, q1 = transitions.gun.inverse_kinematics(
+        np.array([[0.5, y, 0.18], [1.5, y, 0.3]])
+    )
+    fold, unfold = (transitions._folded(float(q[0])) for q in (q0, q1))
+    back, forth = (transitions._retreat(q) for q in (q0, q1))
     ways = [
         [
-            rest_to_rest(a, b, linker.limits)
+            rest_to_rest(a, b, transitions.limits)
             for a, b in itertools.pairwise([q0, *via, q1])
         ]
         for via in (
@@ -145,14 +154,14 @@ def test_transit_is_the_quickest_of_all_clear_ways(robot, height, y):
     durations = [
         sum(leg.duration for leg in way)
         for way in ways
-        if all(linker.clear(leg) for leg in way)
+        if all(transitions.clear(leg) for leg in way)
     ]
-    found = linker.transit(q0, q1)
-    assert all(linker.clear(leg) for leg in found)
+    found = transitions.free_motion(q0, q1)
+    assert all(transitions.clear(leg) for leg in found)
     duration = sum(leg.duration for leg in found)
     if isinstance(found[0], ToolMove):
         # Over a hop it goes where the straight way is not clear, if that is quicker.
-        assert not linker.clear(ways[0][0])
+        assert not transitions.clear(ways[0][0])
         assert duration < min(durations)
     else:
         assert duration == min(durations)
@@ -160,29 +169,31 @@ def test_transit_is_the_quickest_of_all_clear_ways(robot, height, y):
 
 @pytest.mark.parametrize("travel", [0.01, 0.5, 2.0])
 def test_nothing_makes_a_way_quicker_than_rates_and_accelerations(robot, travel):
-    linker = robot.linker()
-    for q1 in linker.q_home + travel * np.random.default_rng(0).normal(size=(20, 5)):
-        least = least_travel(linker.q_home, q1, linker.limits)
-        real = rest_to_rest(linker.q_home, q1, linker.limits)
+    transitions = robot.transitions()
+    for q1 in transitions.q_home + travel * np.random.default_rng(0).normal(
+        size=(20, 5)
+    ):
+        least = least_travel(transitions.q_home, q1, transitions.limits)
+        real = rest_to_rest(transitions.q_home, q1, transitions.limits)
         assert least.duration <= real.duration
 
 
 def test_gun_is_drawn_back_a_little_where_the_joints_straight_way_grazes(robot):
     """Low before the wall the arm swings through a chord's arc, a few mm into it."""
-    linker = robot.linker()
+    transitions = robot.transitions()
     ends = np.array([[0.15, -0.10, 0.18], [1.13, -0.10, 0.15]])
-    q0, q1 = linker.gun.solve(ends)
-    assert not linker.clear(rest_to_rest(q0, q1, linker.limits))
-    (move,) = linker.transit(q0, q1)
-    assert linker.clear(move)
-    places = nozzle(linker, move)
+    q0, q1 = transitions.gun.inverse_kinematics(ends)
+    assert not transitions.clear(rest_to_rest(q0, q1, transitions.limits))
+    (move,) = transitions.free_motion(q0, q1)
+    assert transitions.clear(move)
+    places = nozzle(transitions, move)
     np.testing.assert_allclose(places[[0, -1]], ends, atol=1e-6)
     assert 0.2 < places[:, 2].max() < 0.4
     assert move.duration < 2.5  # Folding and unfolding takes twice as long.
 
 
 def test_no_way_out_of_a_collision(robot):
-    linker = robot.linker(TALL)
-    (inside,) = linker.gun.solve(np.array([[1.0, 0.95, 0.3]]))
+    transitions = robot.transitions(TALL)
+    (inside,) = transitions.gun.inverse_kinematics(np.array([[1.0, 0.95, 0.3]]))
     with pytest.raises(CollisionError, match="transit: .* at 0.00 s"):
-        linker.transit(inside, linker.q_home)
+        transitions.free_motion(inside, transitions.q_home)

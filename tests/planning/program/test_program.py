@@ -177,7 +177,7 @@ def test_verification_finds_a_motion_that_is_too_fast(robot, program):
             kinematics=robot.kinematics,
             limits=robot.limits,
             limit_share=0.9,
-            space=robot.linker().space,
+            space=robot.transitions().space,
             what="rush",
         )
 
@@ -229,7 +229,7 @@ def test_a_program_keeps_the_speed_that_its_nozzle_may_have(robot, make_wall):
             kinematics=robot.kinematics,
             limits=limits,
             limit_share=0.9,
-            space=robot.linker().space,
+            space=robot.transitions().space,
             what="free",
         )
 
@@ -304,7 +304,7 @@ def test_a_stroke_that_ends_in_a_corner_with_no_way_on_is_trimmed(robot, make_wa
 
 
 class NoWay:
-    """A linker with a way back from a stroke once it was asked so often; no other."""
+    """A planner that connects nothing but, after some calls, a stroke to rest."""
 
     def __init__(self, asked):
         self.asked = asked
@@ -333,6 +333,6 @@ def test_run_out_is_room_beyond_the_end_in_the_direction_of_travel(robot):
     shelf = ObstacleBox("shelf", np.array([0.6, 1.5, 0.0]), np.array([1.4, 1.6, 0.34]))
     up = Stroke(np.array([1.0, 0.9]), np.array([1.0, 1.36]), 0.6, "body", 0, 0.3)
     down = up.replace(start_T=up.end_T, end_T=up.start_T)
-    dut = has_run_out([up, down], robot.linker(shelf))
+    dut = has_run_out([up, down], robot.transitions(shelf))
     assert dut.tolist() == [False, True]
-    assert has_run_out([up, down], robot.linker()).tolist() == [True, True]
+    assert has_run_out([up, down], robot.transitions()).tolist() == [True, True]

@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from painter.errors import CollisionError, ReachError
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
-from painter.planning.scan.free_motion import TransferPlanner
+from painter.planning.scan.free_motion import FreeMotionPlanner
 from painter.planning.tile import nominal_tile_pose
 
 MOTION = MotionConfig()
@@ -17,7 +17,7 @@ FOLDED = np.array([0.0, -1.9, 2.6, -0.7, 0.0])
 
 def plan(robot, goal, q0, *, tile=None, X_WT=None):
     tile = tile or TileConfig()
-    planner = TransferPlanner(
+    planner = FreeMotionPlanner(
         **vars(robot), tile=tile, scan=ScanConfig(), motion=MOTION, standoff=0.3
     )
     return planner.plan(goal, q0, X_WT or nominal_tile_pose(tile))
@@ -42,7 +42,7 @@ def test_motion_is_quick_sprays_nothing_and_keeps_off_the_wall(robot, goal, long
 
 @pytest.mark.parametrize("place", [(0.1, 0.05), (1.9, 1.95), (1.0, 1.0)])
 def test_retract_leads_home_from_before_the_wall(robot, place):
-    (q0,) = robot.linker().gun.solve(np.array([[*place, 0.3]]))
+    (q0,) = robot.transitions().gun.inverse_kinematics(np.array([[*place, 0.3]]))
     motion = plan(robot, "retract", q0)
     np.testing.assert_allclose(motion.q[[0, -1]], [q0, HOME], atol=1e-9)
 
@@ -60,7 +60,7 @@ def test_tile_larger_than_reach_ends_the_job_at_first_sight(robot):
 
 
 def test_arm_inside_the_wall_is_a_collision(robot):
-    (q0,) = robot.linker().gun.solve(np.array([[1.0, 1.0, 0.01]]))
+    (q0,) = robot.transitions().gun.inverse_kinematics(np.array([[1.0, 1.0, 0.01]]))
     with pytest.raises(CollisionError, match="stands where it may not: gun"):
         plan(robot, "retract", q0)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
-from painter.planning.scan.free_motion import TransferPlanner
+from painter.planning.scan.free_motion import FreeMotionPlanner
 from painter.planning.scan.more_looks import look_poses, more_looks
 from painter.planning.tile import nominal_tile_pose
 from perception.fine_steps.shadows import Relief
@@ -33,9 +33,9 @@ OVER = ((0.9, 1.1, 1.7, 1.8), (0.9, 1.1, 1.8, 1.86))
 
 @pytest.mark.parametrize("beside", [LEFT, RIGHT, UNDER, OVER])
 def test_one_look_shows_all_wall_beside_a_box_to_both_imagers(robot, beside):
-    linker = robot.linker()
-    (q0,) = linker.gun.solve(END_T)
-    q = look_poses(q0, make_relief(beside), SCAN, linker)
+    transitions = robot.transitions()
+    (q0,) = transitions.gun.inverse_kinematics(END_T)
+    q = look_poses(q0, make_relief(beside), SCAN, transitions)
     assert len(q) == 1
     R_WC, p_WC = robot.kinematics.camera_poses(q)
     X_TW = nominal_tile_pose(TileConfig()).inverse()
@@ -59,35 +59,35 @@ def test_one_look_shows_all_wall_beside_a_box_to_both_imagers(robot, beside):
 
 
 def test_two_shadows_that_no_place_shows_together_take_two_looks(robot):
-    linker = robot.linker()
-    (q0,) = linker.gun.solve(END_T)
+    transitions = robot.transitions()
+    (q0,) = transitions.gun.inverse_kinematics(END_T)
     relief = make_relief(LEFT, RIGHT)
-    assert len(look_poses(q0, relief, SCAN, linker)) == 2
-    path = more_looks(q0, relief, SCAN, linker)
+    assert len(look_poses(q0, relief, SCAN, transitions)) == 2
+    path = more_looks(q0, relief, SCAN, transitions)
     still = [piece for piece in path if np.ptp(piece.q(piece.knots), axis=0).max() == 0]
     assert [piece.duration for piece in still] == [SCAN.more_look_time] * 2
     # From the lower right, the right one comes first.
     first, last = (robot.kinematics.camera_poses(p.q(np.zeros(1)))[1][0] for p in still)
     assert first[1] < last[1]  # W y is to the left.
     one = ScanConfig(more_looks=1)
-    assert len(look_poses(q0, relief, one, linker)) == 1
+    assert len(look_poses(q0, relief, one, transitions)) == 1
 
 
 def test_there_are_no_looks_for_nothing(robot):
-    linker = robot.linker()
-    (q0,) = linker.gun.solve(END_T)
-    assert more_looks(q0, make_relief(), SCAN, linker) == []
+    transitions = robot.transitions()
+    (q0,) = transitions.gun.inverse_kinematics(END_T)
+    assert more_looks(q0, make_relief(), SCAN, transitions) == []
     tiny = (LEFT[0], (0.18, 0.2, 1.0, 1.02))  # 4 cm²
-    assert more_looks(q0, make_relief(tiny), SCAN, linker) == []
+    assert more_looks(q0, make_relief(tiny), SCAN, transitions) == []
     none = ScanConfig(more_looks=0)
-    assert more_looks(q0, make_relief(LEFT), none, linker) == []
+    assert more_looks(q0, make_relief(LEFT), none, transitions) == []
 
 
 def test_the_arm_keeps_clear_of_what_the_scan_has_found(robot):
     tile = TileConfig()
-    (q0,) = robot.linker().gun.solve(END_T)
+    (q0,) = robot.transitions().gun.inverse_kinematics(END_T)
     X_WT = nominal_tile_pose(tile)
-    dut = TransferPlanner(**vars(robot), tile=tile, scan=SCAN, motion=MotionConfig())
+    dut = FreeMotionPlanner(**vars(robot), tile=tile, scan=SCAN, motion=MotionConfig())
     motion = dut.more_looks(q0, make_relief(LEFT, UNDER), X_WT)
     _, p_WGs = robot.kinematics.gun_poses(motion.q)
     assert p_WGs[:, 0].max() <= 1.05 - TOP - MotionConfig().clearance

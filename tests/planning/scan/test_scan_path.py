@@ -19,20 +19,20 @@ HALF_WIDTH = 0.7 * np.tan(np.deg2rad(43.5))
 HALF_HEIGHT = 0.7 * np.tan(np.deg2rad(29.0))
 
 
-def camera_ends(robot, linker, row):
+def camera_ends(robot, transitions, row):
     """Camera in T at both ends of a row, (2, 3) m."""
-    q = linker.gun.solve(np.stack([row.start.x, row.end.x]))
+    q = transitions.gun.inverse_kinematics(np.stack([row.start.x, row.end.x]))
     R_WCs, p_WCs = robot.kinematics.camera_poses(q)
     np.testing.assert_allclose(
-        R_WCs[:, :, 2], [-linker.gun.X_WT.rotation().col(2)] * 2, atol=1e-9
+        R_WCs[:, :, 2], [-transitions.gun.X_WT.rotation().col(2)] * 2, atol=1e-9
     )
-    return (linker.gun.X_WT.inverse() @ p_WCs.T).T
+    return (transitions.gun.X_WT.inverse() @ p_WCs.T).T
 
 
 def test_rows_cover_tile_and_margin_with_the_overlap(robot):
-    linker = robot.linker()
-    rows = scan_rows(TILE, SCAN, linker)
-    ends = np.array([camera_ends(robot, linker, row) for row in rows])
+    transitions = robot.transitions()
+    rows = scan_rows(TILE, SCAN, transitions)
+    ends = np.array([camera_ends(robot, transitions, row) for row in rows])
     np.testing.assert_allclose(ends[..., 2], 0.7, atol=1e-9)
     # A strip of one baseline, 5 cm, on the left of a picture has no depth.
     assert (ends[..., 0].min(axis=1) - HALF_WIDTH + 0.05 <= -0.05 + 1e-9).all()
@@ -46,30 +46,30 @@ def test_rows_cover_tile_and_margin_with_the_overlap(robot):
 
 
 def test_scan_is_quick(robot):
-    linker = robot.linker()
-    segments = scan_segments(linker.q_home, TILE, SCAN, linker)
+    transitions = robot.transitions()
+    segments = scan_segments(transitions.q_home, TILE, SCAN, transitions)
     assert sum(segment.duration for segment in segments) < 25.0
 
 
 def test_looks_keep_their_distance_and_are_near_the_place_asked_for(robot):
-    linker = robot.linker()
-    q = look_poses(np.array([1.0, 1.0]), SCAN, linker)
+    transitions = robot.transitions()
+    q = look_poses(np.array([1.0, 1.0]), SCAN, transitions)
     _, p_WCs = robot.kinematics.camera_poses(q)
-    p_TCs = (linker.gun.X_WT.inverse() @ p_WCs.T).T
+    p_TCs = (transitions.gun.X_WT.inverse() @ p_WCs.T).T
     np.testing.assert_allclose(p_TCs[:, 2], SCAN.look_distance)
     assert np.abs(p_TCs[:, :2] - 1.0).max() <= 0.3 + 1e-9
 
 
 def test_first_sight_is_quick_and_sees_two_quarters_across(robot):
-    linker = robot.linker()
-    segments = look_segments(linker.q_home, TILE, SCAN, linker)
+    transitions = robot.transitions()
+    segments = look_segments(transitions.q_home, TILE, SCAN, transitions)
     # Less than a third of the scan's time, or it might as well scan twice.
     assert sum(segment.duration for segment in segments) + SCAN.look_time <= 5.0
     stops = np.array(
         [segment.q(np.array([segment.duration]))[0] for segment in segments]
     )
     _, p_WCs = robot.kinematics.camera_poses(stops)
-    p_TCs = (linker.gun.X_WT.inverse() @ p_WCs.T).T
+    p_TCs = (transitions.gun.X_WT.inverse() @ p_WCs.T).T
     # Near the quarters' middles: two looks close to one another may both miss the wall.
     low_right = np.abs(p_TCs[:, :2] - [1.5, 0.5]).max(axis=1) <= 0.15
     assert low_right.any()
@@ -78,23 +78,24 @@ def test_first_sight_is_quick_and_sees_two_quarters_across(robot):
 
 def test_scan_of_a_wall_too_far_away_says_by_how_much(robot):
     far = TileConfig(width=4.0)
-    linker = robot.linker()
+    transitions = robot.transitions()
     with pytest.raises(ReachError, match=r"scan row .* needs \d\.\d\d m"):
-        scan_rows(far, SCAN, linker)
+        scan_rows(far, SCAN, transitions)
 
 
 def test_reach_of_a_tile_too_high_names_the_worst_corner(robot):
-    linker = robot.linker()
+    transitions = robot.transitions()
     points = tile_points(2.0, 3.0, 0.3)
     with pytest.raises(ReachError, match=r"tall: \d+ % .* T \([02]\.00, 3\.00\) m"):
-        require_reach(points, gun=linker.gun, limits=robot.limits, what="tall")
+        require_reach(points, gun=transitions.gun, limits=robot.limits, what="tall")
 
 
 def test_wrist_distance_is_that_of_forward_kinematics(robot):
-    linker = robot.linker()
+    transitions = robot.transitions()
     p_TGs = np.array([[0.2, 0.3, 0.3], [1.6, 1.9, 0.5]])
-    _, p_WLs = robot.kinematics.forward(linker.gun.solve(p_TGs))
+    _, p_WLs = robot.kinematics.forward(transitions.gun.inverse_kinematics(p_TGs))
     shoulder = np.array([0.0, 0.0, robot.kinematics.shoulder_height])
     np.testing.assert_allclose(
-        wrist_distances(p_TGs, linker.gun), np.linalg.norm(p_WLs - shoulder, axis=1)
+        wrist_distances(p_TGs, transitions.gun),
+        np.linalg.norm(p_WLs - shoulder, axis=1),
     )

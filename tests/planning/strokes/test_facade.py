@@ -14,24 +14,24 @@ from painter.planning.config import (
     ZoneConfig,
 )
 from painter.planning.film.deposition import mean_film, predicted_film
-from painter.planning.strokes.facade import plan_stations
+from painter.planning.strokes.facade import plan_base_positions
 from painter.planning.strokes.stroke_lines import nominal_pitch
 
 TIP, RASTER, TILE = TipConfig(), RasterConfig(), TileConfig()
 
 
 def stations_of(width, height):
-    return plan_stations(width, height, tile=TILE, tip=TIP, raster=RASTER)
+    return plan_base_positions(width, height, tile=TILE, tip=TIP, raster=RASTER)
 
 
-def film_on(stations, x, y, *, shift=(0.0, 0.0)):
-    """Predicted film over the nominal one; every second station stands off by shift."""
+def film_on(base_positions, x, y, *, shift=(0.0, 0.0)):
+    """Predicted film over the nominal one; every second position is off by shift."""
     strokes = []
-    for number, station in enumerate(stations):
+    for number, base_position in enumerate(base_positions):
         off = np.array(shift) * (number % 2)
         strokes += [
             s.replace(start_T=s.start_T + off, end_T=s.end_T + off)
-            for s in station.strokes_on_wall
+            for s in base_position.strokes_on_wall
         ]
     pitch = nominal_pitch(x[-1] + x[0], tip=TIP, raster=RASTER)
     nominal = mean_film(TIP, speed=RASTER.speed, pitch=pitch)
@@ -40,24 +40,26 @@ def film_on(stations, x, y, *, shift=(0.0, 0.0)):
 
 @pytest.mark.parametrize("size", [(2.0, 2.0), (5.0, 2.0), (10.0, 6.0), (1.2, 3.1)])
 def test_stations_cover_the_wall_with_tiles_that_fit(size):
-    stations = stations_of(*size)
-    for station in stations:
-        assert station.width <= TILE.width + 1e-9
-        assert station.height <= TILE.height + 1e-9
-        assert station.base_x == pytest.approx(station.left + station.width / 2.0)
-    assert min(s.left for s in stations) == pytest.approx(0.0, abs=1e-9)
-    assert max(s.left + s.width for s in stations) == pytest.approx(size[0])
-    assert min(s.bottom for s in stations) == 0.0
-    assert max(s.bottom + s.height for s in stations) == pytest.approx(size[1])
+    base_positions = stations_of(*size)
+    for base_position in base_positions:
+        assert base_position.width <= TILE.width + 1e-9
+        assert base_position.height <= TILE.height + 1e-9
+        assert base_position.base_x == pytest.approx(
+            base_position.left + base_position.width / 2.0
+        )
+    assert min(s.left for s in base_positions) == pytest.approx(0.0, abs=1e-9)
+    assert max(s.left + s.width for s in base_positions) == pytest.approx(size[0])
+    assert min(s.bottom for s in base_positions) == 0.0
+    assert max(s.bottom + s.height for s in base_positions) == pytest.approx(size[1])
 
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.005, 0.0), (0.0, 0.005)])
 def test_film_across_joints_is_within_a_tenth_of_nominal(shift):
-    stations = stations_of(4.0, 3.6)  # Two by two, or more.
-    assert len(stations) >= 4
+    base_positions = stations_of(4.0, 3.6)  # Two by two, or more.
+    assert len(base_positions) >= 4
     x = np.arange(0.005, 4.0, 0.01)
     y = np.arange(0.005, 3.6, 0.01)
-    film = film_on(stations, x, y, shift=shift)
+    film = film_on(base_positions, x, y, shift=shift)
     inside = film[15:-15, 15:-15]  # The wall's own edges are no joints.
     assert inside.min() >= 0.9
     assert inside.max() <= 1.1
@@ -67,10 +69,12 @@ DOOR = ZoneConfig(corners=[[3.0, 0.0], [4.0, 2.1]])
 
 
 def test_openings_stay_clean_and_their_surroundings_are_painted():
-    stations = plan_stations(6.0, 3.6, tile=TILE, tip=TIP, raster=RASTER, zones=[DOOR])
+    base_positions = plan_base_positions(
+        6.0, 3.6, tile=TILE, tip=TIP, raster=RASTER, zones=[DOOR]
+    )
     x = np.arange(0.005, 6.0, 0.01)
     y = np.arange(0.005, 3.6, 0.01)
-    film = film_on(stations, x, y)
+    film = film_on(base_positions, x, y)
     half_fan = 13  # Cells; so far a line beside the door reaches over its edge.
     assert film[:200, 300 + half_fan : 400 - half_fan].max() == 0.0
     assert film[15:200, 15 : 300 - half_fan].min() >= 0.9
@@ -80,20 +84,22 @@ def test_openings_stay_clean_and_their_surroundings_are_painted():
 
 def test_no_station_stands_before_an_opening_alone():
     whole = stations_of(6.0, 2.0)
-    # All that one station would paint is a gate.
+    # All that one base position would paint is a gate.
     gate = ZoneConfig(
         corners=[
             [whole[1].left, 0.0],
             [whole[1].left + whole[1].width, 2.0],
         ]
     )
-    dut = plan_stations(6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[gate])
+    dut = plan_base_positions(6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[gate])
     assert [s.left for s in dut] == [s.left for s in whole if s is not whole[1]]
 
 
 def test_only_what_is_included_gets_strokes():
     zone = ZoneConfig(kind="include", corners=[[0.5, 0.5], [1.5, 1.5]])
-    (dut,) = plan_stations(6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[zone])
+    (dut,) = plan_base_positions(
+        6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[zone]
+    )
     ends = np.array([[s.start_T, s.end_T] for s in dut.strokes_on_wall])
     assert ends[..., 0].min() > 0.45 and ends[..., 0].max() < 1.55
     assert ends[..., 1].min() == pytest.approx(0.5, abs=0.02)
@@ -101,11 +107,11 @@ def test_only_what_is_included_gets_strokes():
 
 
 def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):
-    station = stations_of(4.0, 3.6)[0]
-    shift = np.array([(TILE.width - station.width) / 2.0, 0.0])
+    base_position = stations_of(4.0, 3.6)[0]
+    shift = np.array([(TILE.width - base_position.width) / 2.0, 0.0])
     strokes = [
         s.replace(start_T=s.start_T + shift, end_T=s.end_T + shift)
-        for s in station.strokes
+        for s in base_position.strokes
     ]
     home = np.deg2rad(MotionConfig().home_deg)
     dut = robot.planner(tip=TIP, raster=RASTER).program(strokes, make_wall(), home)
@@ -117,12 +123,14 @@ def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):
 def test_stations_have_one_coat():
     raster = RasterConfig(coats=2)
     with pytest.raises(ValueError, match=r"raster\.coats must be 1 .* got 2"):
-        plan_stations(5.0, 2.0, tile=TileConfig(), tip=TipConfig(), raster=raster)
+        plan_base_positions(5.0, 2.0, tile=TileConfig(), tip=TipConfig(), raster=raster)
 
 
 def test_a_tile_lower_than_two_overlaps_is_refused():
     with pytest.raises(ValueError, match="two overlaps"):
-        plan_stations(4.0, 4.0, tile=TileConfig(height=0.3), tip=TIP, raster=RASTER)
+        plan_base_positions(
+            4.0, 4.0, tile=TileConfig(height=0.3), tip=TIP, raster=RASTER
+        )
 
 
 def reach_with(share):

@@ -7,9 +7,9 @@ import pytest
 
 from painter.planning.spray_path import Stroke
 from painter.planning.strokes.stroke_order import (
-    link_time,
     order_strokes,
     reversed_stroke,
+    transition_time,
 )
 
 HOME = np.array([1.0, 1.0, 0.5])
@@ -54,7 +54,7 @@ def spans(strokes):
 def test_few_strokes_come_close_to_the_best_of_all_orders(seed):
     strokes = scattered(seed, 5)
     best = min(
-        link_time(
+        transition_time(
             [s if up else reversed_stroke(s) for s, up in zip(each, ups, strict=True)],
             HOME,
             HOME,
@@ -64,20 +64,22 @@ def test_few_strokes_come_close_to_the_best_of_all_orders(seed):
     )
     dut = order_strokes(strokes, HOME, HOME)
     assert spans(dut) == spans(strokes)
-    assert link_time(dut, HOME, HOME) <= 1.1 * best
+    assert transition_time(dut, HOME, HOME) <= 1.1 * best
 
 
 def test_order_is_never_worse_than_the_given_one():
     strokes = line_by_line(scattered(9, 30))
     dut = order_strokes(strokes, HOME, HOME)
     assert spans(dut) == spans(strokes)
-    assert link_time(dut, HOME, HOME) <= link_time(strokes, HOME, HOME)
+    assert transition_time(dut, HOME, HOME) <= transition_time(strokes, HOME, HOME)
 
 
 def test_reversing_everything_takes_as_long():
     strokes = scattered(3, 6)
     back = [reversed_stroke(s) for s in reversed(strokes)]
-    assert link_time(back, HOME, HOME) == pytest.approx(link_time(strokes, HOME, HOME))
+    assert transition_time(back, HOME, HOME) == pytest.approx(
+        transition_time(strokes, HOME, HOME)
+    )
 
 
 def test_u_turn_takes_the_time_of_a_full_reversal():
@@ -86,7 +88,7 @@ def test_u_turn_takes_the_time_of_a_full_reversal():
     # From rest to 0.6 m/s at the same place: back and forth at 2.5 m/s², twice; and
     # from 0.6 m/s up to 0.6 m/s down. Time = (2 peak + v) / a, peak = v / sqrt(2).
     ends = 2.0 * (2.0 / np.sqrt(2.0) + 1.0) * 0.6 / 2.5
-    assert link_time([up, down], *rests) == pytest.approx(ends + 2.0 * 0.6 / 2.5)
+    assert transition_time([up, down], *rests) == pytest.approx(ends + 2.0 * 0.6 / 2.5)
 
 
 def test_strokes_that_go_on_stay_together():

@@ -7,8 +7,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
-from painter.planning.motion.gun_path import SquareGun
-from painter.planning.scan.free_motion import TransferPlanner
+from painter.planning.motion.gun_path import WallIk
+from painter.planning.scan.free_motion import FreeMotionPlanner
 from painter.planning.spray_path import Motion
 from painter.planning.tile import nominal_tile_pose
 from painter.robot.arm_model import (
@@ -27,7 +27,7 @@ HOME = np.deg2rad(MotionConfig().home_deg)
 
 def make_planner(**tile):
     plant = MakeArmPlant(DIRECTIVES)
-    planner = TransferPlanner(
+    planner = FreeMotionPlanner(
         kinematics=GetArmKinematics(plant),
         limits=GetArmLimits(plant),
         checker=MakeCollisionChecker(DIRECTIVES, clearance=0.04),
@@ -82,8 +82,8 @@ def test_more_looks_go_to_what_the_map_lacks_beside_a_box(planner):
     box = (abs(x - 0.3) < 0.1) & (abs(y - 1.0) < 0.1)
     shadow = (x > 0.13) & (x < 0.2) & (abs(y - 1.0) < 0.1)
     X_WT = nominal_tile_pose(TileConfig())
-    gun = SquareGun(GetArmKinematics(MakeArmPlant(DIRECTIVES)), X_WT)
-    (q,) = gun.solve(np.array([[1.4, 0.4, 0.5]]))
+    gun = WallIk(GetArmKinematics(MakeArmPlant(DIRECTIVES)), X_WT)
+    (q,) = gun.inverse_kinematics(np.array([[1.4, 0.4, 0.5]]))
     ends = []
     for gap in (shadow, np.zeros_like(shadow)):
         p_TQs = np.stack([x, y, np.where(box, 0.1, 0.0)])[:, ~gap]

@@ -11,7 +11,7 @@ from painter.systems.hardware.realsense_camera import RealsenseCamera
 SHAPE = {"width": 8, "height": 4, "color_width": 8, "color_height": 4}
 
 
-class Body:
+class RobotConnection:
     """A simulator around the system, with a reading that tests set."""
 
     def __init__(self):
@@ -33,66 +33,66 @@ class Body:
 
 
 @pytest.fixture
-def body():
-    return Body()
+def connection():
+    return RobotConnection()
 
 
-def test_before_the_first_picture_there_is_none(body):
-    body.advance(0.05)
-    assert body.port("image_time")[0] == -1.0
-    assert not body.port("depth_image").data.any()
-    assert body.port("status").state == "starting"
-    assert body.port("status").fault is None
+def test_before_the_first_picture_there_is_none(connection):
+    connection.advance(0.05)
+    assert connection.port("image_time")[0] == -1.0
+    assert not connection.port("depth_image").data.any()
+    assert connection.port("status").state == "starting"
+    assert connection.port("status").fault is None
 
 
-def test_the_picture_has_the_time_at_which_it_was_taken(body):
-    body.advance(1.0)
-    body.picture(1, age=0.05)
-    body.advance(0.03)  # The look due at 1.0 s was left for now.
+def test_the_picture_has_the_time_at_which_it_was_taken(connection):
+    connection.advance(1.0)
+    connection.picture(1, age=0.05)
+    connection.advance(0.03)  # The look due at 1.0 s was left for now.
     # Its age is measured in this computer's time, which runs on while the test does.
-    assert body.port("image_time")[0] == pytest.approx(1.0 - 0.05, abs=0.01)
-    assert (body.port("depth_image").data == 700).all()
+    assert connection.port("image_time")[0] == pytest.approx(1.0 - 0.05, abs=0.01)
+    assert (connection.port("depth_image").data == 700).all()
 
 
-def test_the_same_picture_stays_and_a_newer_one_replaces_it(body):
-    body.advance(1.0)
-    body.picture(1, age=0.05)
-    body.advance(0.1)
-    first = body.port("image_time")[0]
-    body.advance(0.1)
-    assert body.port("image_time")[0] == first
-    body.picture(2, age=0.01, depth=800)
-    body.advance(0.1)
-    assert body.port("image_time")[0] > first
-    assert (body.port("depth_image").data == 800).all()
+def test_the_same_picture_stays_and_a_newer_one_replaces_it(connection):
+    connection.advance(1.0)
+    connection.picture(1, age=0.05)
+    connection.advance(0.1)
+    first = connection.port("image_time")[0]
+    connection.advance(0.1)
+    assert connection.port("image_time")[0] == first
+    connection.picture(2, age=0.01, depth=800)
+    connection.advance(0.1)
+    assert connection.port("image_time")[0] > first
+    assert (connection.port("depth_image").data == 800).all()
 
 
-def test_pictures_from_before_the_run_are_left_out(body):
-    body.picture(1, age=30.0)
-    body.advance(0.1)
-    assert body.port("image_time")[0] == -1.0
-    assert not body.port("depth_image").data.any()
+def test_pictures_from_before_the_run_are_left_out(connection):
+    connection.picture(1, age=30.0)
+    connection.advance(0.1)
+    assert connection.port("image_time")[0] == -1.0
+    assert not connection.port("depth_image").data.any()
 
 
-def test_colour_is_shown_where_it_fits(body):
+def test_colour_is_shown_where_it_fits(connection):
     color = np.full((4, 8, 3), (1, 2, 3), np.uint8)
-    body.advance(1.0)
-    body.picture(1, age=0.0, color=color)
-    body.advance(0.1)
-    assert (body.port("color_image").data == (1, 2, 3, 255)).all()
-    body.picture(2, age=0.0, color=np.ones((2, 2, 3), np.uint8))
-    body.advance(0.1)
-    assert (body.port("color_image").data == (0, 0, 0, 255)).all()
+    connection.advance(1.0)
+    connection.picture(1, age=0.0, color=color)
+    connection.advance(0.1)
+    assert (connection.port("color_image").data == (1, 2, 3, 255)).all()
+    connection.picture(2, age=0.0, color=np.ones((2, 2, 3), np.uint8))
+    connection.advance(0.1)
+    assert (connection.port("color_image").data == (0, 0, 0, 255)).all()
 
 
-def test_a_missing_camera_says_so(body):
-    body.advance(0.1)
+def test_a_missing_camera_says_so(connection):
+    connection.advance(0.1)
     problem = "camera: no picture for 1 s. Try 1 of 5 follows."
-    body.reading = Reading(
+    connection.reading = Reading(
         health=CameraHealth(CameraState.MISSING, problem, repeated=2, late=3)
     )
-    body.advance(0.1)
-    status = body.port("status")
+    connection.advance(0.1)
+    status = connection.port("status")
     assert status.state == "missing"
     assert status.fault == problem
     assert status.dropped == 5

@@ -91,7 +91,7 @@ def test_voxels_seen_much_less_than_those_around_are_ghosts():
     wall = np.full((3, 20), 0.5012)
     wall[2] = 0.0
     ghost = np.array([[0.5062], [0.5012], [0.1]])  # The next column.
-    dut = make_map(min_count=1, ghost_share=0.15)
+    dut = make_map(min_count=1, outlier_share=0.15)
     for frame in range(10):
         points = np.hstack([wall, ghost]) if frame == 0 else wall
         dut = dut.fuse(X_WT @ points, p_WC)

@@ -5,7 +5,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from perception.mapping.config import MapperConfig
 from perception.mapping.keyframes.keyframe import PlaneSight
 from perception.mapping.pose_graph.graph import Graph, Problem, Settled, Sighting
-from perception.mapping.pose_graph.links import Link, LinkKind
+from perception.mapping.pose_graph.links import ConstraintKind, PoseConstraint
 from perception.mapping.pose_graph.observability import observed_directions
 from perception.mapping.pose_graph.poses import Poses
 
@@ -26,10 +26,10 @@ def true_poses():
 
 def exact_links(poses, steps=(1, 2, 3)):
     return [
-        Link(
+        PoseConstraint(
             i,
             i + d,
-            LinkKind.APPEARANCE,
+            ConstraintKind.APPEARANCE,
             poses[i].inverse() @ poses[i + d],
             INFORMATION,
             100,

@@ -6,9 +6,9 @@ from perception.mapping.config import MapperConfig
 from perception.mapping.keyframes import keyframe
 from perception.mapping.keyframes.keyframe import find_features
 from perception.mapping.pose_graph.links import (
+    constraint_by_appearance,
+    constraint_by_geometry,
     floored,
-    link_by_appearance,
-    link_by_geometry,
 )
 
 CONFIG = MapperConfig()
@@ -42,7 +42,7 @@ OFFSET = RigidTransform(RollPitchYaw(0.004, -0.006, 0.003), [0.004, -0.003, 0.00
 def test_a_corner_determines_all_directions(intrinsics):
     X_ij = RigidTransform(RollPitchYaw(0.02, 0.03, -0.01), [0.05, 0.02, 0.01])
     a, b = (grid_of(intrinsics, CORNER, X) for X in (RigidTransform(), X_ij))
-    link = link_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
+    link = constraint_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
     assert link.rank == 6
     off = X_ij.inverse() @ link.X_ij
     # Depth is rounded to whole mm, and the grid's points are the mean of 64 pixels.
@@ -53,7 +53,7 @@ def test_a_corner_determines_all_directions(intrinsics):
 def test_a_wall_corrects_distance_and_tilt_and_leaves_the_rest(intrinsics):
     X_ij = RigidTransform([0.05, 0.02, 0.01])
     a, b = (grid_of(intrinsics, WALL, X) for X in (RigidTransform(), X_ij))
-    link = link_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
+    link = constraint_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
     assert link.rank == 3
     off = X_ij.inverse() @ link.X_ij
     assert off.translation()[2] == pytest.approx(0.0, abs=3e-4)
@@ -69,7 +69,9 @@ def test_a_wall_corrects_distance_and_tilt_and_leaves_the_rest(intrinsics):
 def test_views_that_share_nothing_are_not_linked(intrinsics):
     a = grid_of(intrinsics, WALL, RigidTransform())
     assert (
-        link_by_geometry(a, a, RigidTransform([3, 0, 0]), intrinsics, CONFIG, (0, 1))
+        constraint_by_geometry(
+            a, a, RigidTransform([3, 0, 0]), intrinsics, CONFIG, (0, 1)
+        )
         is None
     )
 
@@ -84,7 +86,7 @@ def test_information_never_passes_its_floor():
 def test_texture_gives_the_pose_between_two_frames(textured_scan, intrinsics):
     (a, X_Wa), (b, X_Wb) = textured_scan[0], textured_scan[2]
     seen = [find_features(frame, intrinsics, CONFIG) for frame in (a, b)]
-    link, inliers = link_by_appearance(*seen, intrinsics, CONFIG, (0, 1))
+    link, inliers = constraint_by_appearance(*seen, intrinsics, CONFIG, (0, 1))
     off = (X_Wa.inverse() @ X_Wb).inverse() @ link.X_ij
     assert inliers > 50
     # Tilt and displacement of a plane are told apart by depth alone, pixel by pixel.
@@ -94,4 +96,4 @@ def test_texture_gives_the_pose_between_two_frames(textured_scan, intrinsics):
 
 def test_noise_is_no_texture(blank_scan, intrinsics):
     seen = [find_features(f, intrinsics, CONFIG) for f, _ in blank_scan[:2]]
-    assert link_by_appearance(*seen, intrinsics, CONFIG, (0, 1))[0] is None
+    assert constraint_by_appearance(*seen, intrinsics, CONFIG, (0, 1))[0] is None
