@@ -232,18 +232,31 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         path = models_path("scenarios", f"{name}.scenario.yaml")
         if not path.is_file():
             known = ", ".join(named_scenarios())
-            raise InputError(f"scenario {name!r} is unknown; known are: {known}.")
+            raise InputError(
+                f"scenario {name!r} is unknown; known are: {known}.",
+                code="PNT-SCENARIO-001",
+            )
     try:
         document = yaml.safe_load(path.read_text())
     except FileNotFoundError:
-        raise InputError(f"{path}: no such scenario file.") from None
+        raise InputError(
+            f"{path}: no such scenario file.", code="PNT-SCENARIO-002"
+        ) from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: {_one_line(error)}") from error
+        raise InputError(
+            f"{path}: {_one_line(error)}", code="PNT-SCENARIO-003"
+        ) from error
     if not isinstance(document, dict) or len(document) != 1:
-        raise InputError(f"{path}: expected one top key, the scenario's name.")
+        raise InputError(
+            f"{path}: expected one top key, the scenario's name.",
+            code="PNT-SCENARIO-004",
+        )
     ((top, fields),) = document.items()
     if not isinstance(fields, dict | None):
-        raise InputError(f"{path}: expected fields below {top!r}, got {fields!r}.")
+        raise InputError(
+            f"{path}: expected fields below {top!r}, got {fields!r}.",
+            code="PNT-SCENARIO-005",
+        )
     fields = dict(fields or {})
     fields.setdefault("name", str(top))
     for word in overrides:
@@ -254,7 +267,9 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         )
         scenario.validate()
     except (RuntimeError, ValueError, TypeError, KeyError, AssertionError) as error:
-        raise InputError(f"{path}: {_one_line(error)}") from error
+        raise InputError(
+            f"{path}: {_one_line(error)}", code="PNT-SCENARIO-006"
+        ) from error
     return scenario
 
 
@@ -267,16 +282,22 @@ def dump_scenario(scenario: Scenario) -> str:
 def _override(fields: dict[str, Any], word: str) -> None:
     key, separator, text = word.partition("=")
     if not separator or not key:
-        raise InputError(f"--set {word!r}: expected key=value.")
+        raise InputError(
+            f"--set {word!r}: expected key=value.", code="PNT-SCENARIO-007"
+        )
     *parents, last = key.split(".")
     for parent in parents:
         fields = fields.setdefault(parent, {})
         if not isinstance(fields, dict):
-            raise InputError(f"--set {word!r}: {parent!r} has no fields.")
+            raise InputError(
+                f"--set {word!r}: {parent!r} has no fields.", code="PNT-SCENARIO-008"
+            )
     try:
         fields[last] = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise InputError(f"--set {word!r}: {_one_line(error)}") from error
+        raise InputError(
+            f"--set {word!r}: {_one_line(error)}", code="PNT-SCENARIO-009"
+        ) from error
 
 
 def _one_line(error: Exception) -> str:

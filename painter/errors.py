@@ -1,10 +1,10 @@
 """Errors that Painter reports in one line: what, where, and the bound."""
 
+from perception.ground import CodedError
 
-class PainterError(Exception):
-    """A job failed; the command line prints the message and exits with `exit_code`."""
 
-    exit_code = 1
+class PainterError(CodedError):
+    """A job failed; the command line prints message and code, and exits."""
 
 
 class InputError(PainterError):

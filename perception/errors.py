@@ -1,10 +1,10 @@
 """Errors of perception; each message names the file or quantity, value and bound."""
 
+from perception.ground import CodedError
 
-class PerceptionError(Exception):
-    """Perception cannot give a right answer; `exit_code` is the command line's."""
 
-    exit_code = 1
+class PerceptionError(CodedError):
+    """Perception cannot give a right answer."""
 
 
 class CloudReadError(PerceptionError):

@@ -85,7 +85,7 @@ def joint_film(
     job,
     off: float,
 ) -> tuple[float, float]:
-    """Returns least and most film over nominal, every second position off along x, y."""
+    """Returns least and most film over nominal; every second position is off."""
     strokes = [
         stroke.replace(
             start_T=stroke.start_T + off * (number % 2),

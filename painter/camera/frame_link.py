@@ -38,7 +38,9 @@ class FrameServer:
             self._listener.bind(path)
         except OSError as error:
             self._listener.close()
-            raise CameraError(f"camera socket {path}: {error.strerror}.") from error
+            raise CameraError(
+                f"camera socket {path}: {error.strerror}.", code="PNT-CAMERA-001"
+            ) from error
         self._listener.listen()
         self._clients: list[socket.socket] = []
 
@@ -116,7 +118,9 @@ class FrameLink:
         except OSError as error:
             self.close()
             text = error.strerror or str(error)
-            raise CameraError(f"camera socket {self._path}: {text}.") from error
+            raise CameraError(
+                f"camera socket {self._path}: {text}.", code="PNT-CAMERA-002"
+            ) from error
         self._clock.sleep(when + self._latency - self._clock.now())
         return depth.reshape(height, width).astype(np.uint16), color, when
 

@@ -87,7 +87,8 @@ def camera_opener(
     if importlib.util.find_spec("pyrealsense2") is None:
         raise InputError(
             "the camera needs pyrealsense2; install it with: "
-            "pip install 'painter[hardware]'."
+            "pip install 'painter[hardware]'.",
+            code="PNT-CAMERA-003",
         )
     from painter.camera import realsense, software
 
@@ -184,7 +185,8 @@ class CameraReader:
                 if frame is None:
                     if now - heard > self._config.silence:
                         raise CameraError(
-                            f"camera: no picture for {self._config.silence:g} s."
+                            f"camera: no picture for {self._config.silence:g} s.",
+                            code="PNT-CAMERA-004",
                         )
                     continue
                 heard = now

@@ -33,11 +33,14 @@ def open_device(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSe
     devices = list(rs.context().query_devices())
     serials = [device.get_info(rs.camera_info.serial_number) for device in devices]
     if not devices:
-        raise CameraError("camera: no RealSense device is connected.")
+        raise CameraError(
+            "camera: no RealSense device is connected.", code="PNT-CAMERA-005"
+        )
     if config.serial and config.serial not in serials:
         raise CameraError(
             f"camera: serial number {config.serial} is not connected; "
-            f"there are {', '.join(serials)}."
+            f"there are {', '.join(serials)}.",
+            code="PNT-CAMERA-006",
         )
     number = serials.index(config.serial) if config.serial else 0
     return RealSense(devices[number], config, wanted, name=serials[number])
@@ -50,12 +53,16 @@ def open_recording(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "Rea
         CameraError: It is missing, damaged, or has no depth.
     """
     if not Path(config.recording).is_file():
-        raise CameraError(f"camera: {config.recording}: no such recording.")
+        raise CameraError(
+            f"camera: {config.recording}: no such recording.", code="PNT-CAMERA-007"
+        )
     _try_recording(config.recording)
     try:
         device = rs.context().load_device(config.recording)
     except RuntimeError as error:
-        raise CameraError(f"camera: {config.recording}: {_line(error)}") from error
+        raise CameraError(
+            f"camera: {config.recording}: {_line(error)}", code="PNT-CAMERA-008"
+        ) from error
     return RealSense(device, config, wanted, name=config.recording)
 
 
@@ -99,7 +106,9 @@ class RealSense:
                     self._start(*found, self._colors)
         except RuntimeError as error:
             self.close()
-            raise CameraError(f"camera {name}: {_line(error)}") from error
+            raise CameraError(
+                f"camera {name}: {_line(error)}", code="PNT-CAMERA-009"
+            ) from error
         except CameraError:
             self.close()
             raise
@@ -115,14 +124,18 @@ class RealSense:
             if not there:
                 if self._device.is_playback() or self._device.is_connected():
                     return None
-                raise CameraError(f"camera {self._name}: it was unplugged.")
+                raise CameraError(
+                    f"camera {self._name}: it was unplugged.", code="PNT-CAMERA-010"
+                )
             for step in self._filters:
                 frame = step.process(frame)
             while (color := self._colors.poll_for_frame()).is_frame():
                 self._color = np.array(color.get_data())
             depth = np.array(frame.get_data())
         except RuntimeError as error:
-            raise CameraError(f"camera {self._name}: {_line(error)}") from error
+            raise CameraError(
+                f"camera {self._name}: {_line(error)}", code="PNT-CAMERA-011"
+            ) from error
         if self._unit_mm != 1.0:
             scaled = np.rint(depth * self._unit_mm)
             depth = np.where(scaled > 65535, 0, scaled).astype(np.uint16)
@@ -163,7 +176,8 @@ class RealSense:
         shown = ", ".join(sorted({f"{w} x {h} at {fps} Hz" for w, h, fps in offers}))
         raise CameraError(
             f"camera {self._name}: no {stream.name} of {wanted.width} x "
-            f"{wanted.height} at {self._config.fps} Hz; it has {shown or 'none'}."
+            f"{wanted.height} at {self._config.fps} Hz; it has {shown or 'none'}.",
+            code="PNT-CAMERA-012",
         )
 
     def _find_color(self, wanted: CameraIntrinsics) -> tuple[Any, Any] | None:
@@ -223,13 +237,15 @@ def apply_options(sensor: Any, config: CameraDriverConfig) -> None:
         if not limits.min <= value <= limits.max:
             raise CameraError(
                 f"camera: {option.name} must be {limits.min:g} to {limits.max:g}, "
-                f"got {value}."
+                f"got {value}.",
+                code="PNT-CAMERA-013",
             )
         sensor.set_option(option, value)
         found = sensor.get_option(option)
         if abs(found - value) > max(limits.step, 0.5):
             raise CameraError(
-                f"camera: {option.name} was set to {value} and reads {found:g}."
+                f"camera: {option.name} was set to {value} and reads {found:g}.",
+                code="PNT-CAMERA-014",
             )
 
 
@@ -253,18 +269,25 @@ def _try_recording(path: str) -> None:
         )
     except subprocess.TimeoutExpired as error:
         raise CameraError(
-            f"camera: {path}: librealsense takes over {_TRY_TIME:g} s to open it."
+            f"camera: {path}: librealsense takes over {_TRY_TIME:g} s to open it.",
+            code="PNT-CAMERA-015",
         ) from error
     if done.returncode != 0:
         words = done.stderr.decode(errors="replace").split()
         reason = " ".join(words) or f"it ended with {done.returncode}"
-        raise CameraError(f"camera: {path}: librealsense cannot open it: {reason}.")
+        raise CameraError(
+            f"camera: {path}: librealsense cannot open it: {reason}.",
+            code="PNT-CAMERA-016",
+        )
 
 
 def _intrinsics(name: str, profile: Any) -> CameraIntrinsics:
     lens = profile.as_video_stream_profile().get_intrinsics()
     if any(lens.coeffs):
-        raise CameraError(f"camera {name}: its depth is distorted, not rectified.")
+        raise CameraError(
+            f"camera {name}: its depth is distorted, not rectified.",
+            code="PNT-CAMERA-017",
+        )
     return CameraIntrinsics(
         fx=lens.fx, fy=lens.fy, cx=lens.ppx, cy=lens.ppy,
         width=lens.width, height=lens.height,

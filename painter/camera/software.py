@@ -89,7 +89,8 @@ class SoftwareCamera:
     ) -> None:
         if pixels.shape[:2] != self._shape:
             raise CameraError(
-                f"camera source: a picture of {pixels.shape[:2]}, not {self._shape}."
+                f"camera source: a picture of {pixels.shape[:2]}, not {self._shape}.",
+                code="PNT-CAMERA-018",
             )
         frame = rs.software_video_frame()
         frame.pixels = np.ascontiguousarray(pixels)

@@ -103,7 +103,7 @@ def parse_board(word: str) -> BoardConfig:
         )
         config.validate()
     except ValueError as error:
-        raise InputError(f"--board {word}: {error}") from None
+        raise InputError(f"--board {word}: {error}", code="PNT-USE-001") from None
     return config
 
 
@@ -118,7 +118,7 @@ def read_joints(path: Path) -> tuple[FloatArray, FloatArray]:
             not increase; names the line.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such file.")
+        raise InputError(f"{path}: no such file.", code="PNT-USE-002")
     rows: list[list[float]] = []
     for number, line in enumerate(path.read_text().splitlines(), 1):
         words = line.split("#")[0].split()
@@ -129,12 +129,18 @@ def read_joints(path: Path) -> tuple[FloatArray, FloatArray]:
         except ValueError:
             row = []
         if len(row) != 6 or not np.all(np.isfinite(row)):
-            raise InputError(f"{path}: line {number} is no time and five positions.")
+            raise InputError(
+                f"{path}: line {number} is no time and five positions.",
+                code="PNT-USE-003",
+            )
         if rows and row[0] <= rows[-1][0]:
-            raise InputError(f"{path}: line {number} is not after the one before.")
+            raise InputError(
+                f"{path}: line {number} is not after the one before.",
+                code="PNT-USE-004",
+            )
         rows.append(row)
     if not rows:
-        raise InputError(f"{path}: holds no joint positions.")
+        raise InputError(f"{path}: holds no joint positions.", code="PNT-USE-005")
     table = np.array(rows)
     return table[:, 0], table[:, 1:]
 

@@ -77,7 +77,9 @@ def canlog(
     known = decoder.node_names
     for node in nodes or ():
         if node not in known:
-            raise InputError(f"--node {node!r}: known are {', '.join(known)}.")
+            raise InputError(
+                f"--node {node!r}: known are {', '.join(known)}.", code="PNT-USE-006"
+            )
     is_shown = not (summary or as_json)
     start, foreign, last = None, 0, None
     for record in read_lines(log):
@@ -95,7 +97,7 @@ def canlog(
         if is_shown and _is_wanted(decoded, changes, nodes or (), kinds or ()):
             _print_line(record, decoded, time)
     if last is None:
-        raise InputError(f"{log}: holds no CANopen frames.")
+        raise InputError(f"{log}: holds no CANopen frames.", code="PNT-USE-007")
     if not is_shown:
         print_result(figures.figures() | {"foreign": foreign}, as_json=as_json)
 
@@ -112,7 +114,9 @@ def _replay(log: Path, bus: BusConfig, folder: Path) -> dict[str, object]:
     try:
         played = LogBus(bus, read_log(log).records)
     except InputError as error:
-        raise InputError(f"{log}: {str(error).removeprefix(f'{log}: ')}") from error
+        raise InputError(
+            f"{log}: {str(error).removeprefix(f'{log}: ')}", code="PNT-USE-008"
+        ) from error
     found = ReplayLog(Scenario(), played, bus.cycle)
     with output_folder(folder) as draft:
         save_executed(

@@ -139,7 +139,7 @@ def operator_zones(
                 zone.validate(name)
                 zone.require_on(width, height, name)
             except ValueError as error:
-                raise InputError(str(error)) from error
+                raise InputError(str(error), code="PNT-USE-009") from error
             zones.append(zone)
     return zones
 
@@ -160,11 +160,12 @@ def mark_corners(option: str, word: str) -> list[list[float]]:
     try:
         numbers = [float(text) for text in word.split(",")]
     except ValueError as error:
-        raise InputError(f"{option} {word!r}: {error}.") from error
+        raise InputError(f"{option} {word!r}: {error}.", code="PNT-USE-010") from error
     if len(numbers) < 4 or len(numbers) % 2:
         raise InputError(
             f"{option} {word!r}: expected two or more pairs X,Y, got {len(numbers)} "
-            "numbers."
+            "numbers.",
+            code="PNT-USE-011",
         )
     return [numbers[i : i + 2] for i in range(0, len(numbers), 2)]
 
@@ -211,12 +212,16 @@ def output_folder(folder: Path) -> Iterator[Path]:
         InputError: `folder` is a file or cannot be made.
     """
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {folder}: there is a file of that name.")
+        raise InputError(
+            f"--out {folder}: there is a file of that name.", code="PNT-USE-012"
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     except OSError as error:
-        raise InputError(f"--out {folder}: {error.strerror}.") from error
+        raise InputError(
+            f"--out {folder}: {error.strerror}.", code="PNT-USE-013"
+        ) from error
     try:
         yield draft
         folder.mkdir(exist_ok=True)

@@ -124,17 +124,25 @@ def deploy(
         FaultError: The cycle did not come to DONE; the run folder says why.
     """
     if resume is not None and scenario is not None:
-        raise InputError(f"{scenario}: the scenario is that of {resume}; give none.")
+        raise InputError(
+            f"{scenario}: the scenario is that of {resume}; give none.",
+            code="PNT-USE-014",
+        )
     if resume is not None and out.resolve() == resume.resolve():
-        raise InputError(f"--out {out}: is the run to be gone on with; give another.")
+        raise InputError(
+            f"--out {out}: is the run to be gone on with; give another.",
+            code="PNT-USE-015",
+        )
     if speed < 1.0 and not dry_run:
         raise InputError(
             f"--speed {speed:g}: needs --dry-run; the film would be "
-            f"{1.0 / speed:.1f} times as thick."
+            f"{1.0 / speed:.1f} times as thick.",
+            code="PNT-USE-016",
         )
     if rate < 1.0 and camera is None:
         raise InputError(
-            f"--rate {rate:g}: needs --camera, a rehearsal; a robot's clock runs at 1."
+            f"--rate {rate:g}: needs --camera, a rehearsal; a robot's clock runs at 1.",
+            code="PNT-USE-017",
         )
     clock = TimeBase(rate)
     earlier = None if resume is None else RunFolder.open(resume)
@@ -210,7 +218,7 @@ def deploy(
     else:
         print_summary(figures, out)
     if result != Phase.DONE:
-        raise FaultError(f"{result.value}: {cause}")
+        raise FaultError(f"{result.value}: {cause}", code="PNT-USE-018")
 
 
 def rehearsed(bus: BusConfig) -> BusConfig:
@@ -295,7 +303,10 @@ def _check(
         result = {"passed": check.passed, "text": check.text}
         folder.log(0.0, "check", check=check.name, **result)
         if not check.passed:
-            raise BusError(f"pre-flight check {check.name}: {check.text.rstrip('.')}.")
+            raise BusError(
+                f"pre-flight check {check.name}: {check.text.rstrip('.')}.",
+                code="PNT-USE-019",
+            )
 
 
 def _log_health(

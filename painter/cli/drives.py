@@ -92,7 +92,9 @@ def drives(
         PainterError: The simulated world has ended.
     """
     if scenario is None and (overrides or truth is not None):
-        raise InputError("--set and --truth: go with --scenario alone.")
+        raise InputError(
+            "--set and --truth: go with --scenario alone.", code="PNT-USE-020"
+        )
     bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
     bus = dataclasses.replace(
         bus,
@@ -145,13 +147,21 @@ def _bench(scenario: str, overrides: Sequence[str], camera: str) -> "HilBench":
 def _fault(word: str) -> tuple[float, Fault, str]:
     match = _FAULT.fullmatch(word)
     if match is None:
-        raise InputError(f"--fault {word!r}: expected NAME[@AXIS]:SECONDS.")
+        raise InputError(
+            f"--fault {word!r}: expected NAME[@AXIS]:SECONDS.", code="PNT-USE-021"
+        )
     name, axis = match["name"], match["axis"] or AXES[0]
     if name not in list(Fault):
-        raise InputError(f"--fault {word!r}: known are {', '.join(Fault)}.")
+        raise InputError(
+            f"--fault {word!r}: known are {', '.join(Fault)}.", code="PNT-USE-022"
+        )
     if axis not in AXES:
-        raise InputError(f"--fault {word!r}: axes are {', '.join(AXES)}.")
+        raise InputError(
+            f"--fault {word!r}: axes are {', '.join(AXES)}.", code="PNT-USE-023"
+        )
     try:
         return float(match["time"]), Fault(name), axis
     except ValueError:
-        raise InputError(f"--fault {word!r}: the time must be in s.") from None
+        raise InputError(
+            f"--fault {word!r}: the time must be in s.", code="PNT-USE-024"
+        ) from None

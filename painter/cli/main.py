@@ -124,7 +124,7 @@ def run(arguments: Sequence[str]) -> int:
         _print_error(error.format_message())
         return EXIT_INPUT
     except (PainterError, PerceptionError) as error:
-        _print_error(str(error))
+        _print_error(f"{error} [{error.code}]")
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
         code = EXIT_INTERRUPTED

@@ -93,13 +93,16 @@ def map(
     """
     config = mapper_config(overrides)
     if voxels is not None and not 0.0 < voxels < math.inf:
-        raise InputError(f"--voxels must be > 0 m, got {voxels!r}.")
+        raise InputError(f"--voxels must be > 0 m, got {voxels!r}.", code="PNT-USE-025")
     with ExitStack() as stack:
         intrinsics, source, total = _source(stack, frames, poses, use_poses)
         session = None
         if store is not None:
             if store.resolve() == frames.resolve():
-                raise InputError(f"--store {store}: is the map file to be replayed.")
+                raise InputError(
+                    f"--store {store}: is the map file to be replayed.",
+                    code="PNT-USE-026",
+                )
             session = stack.enter_context(MapStore(store))
             session.start(intrinsics, config)
         mapper = Mapper(intrinsics, config)
@@ -113,7 +116,9 @@ def map(
         if onto is not None:
             known = stack.enter_context(open_map(onto))
             if known.intrinsics != intrinsics:
-                raise InputError(f"{onto}: was made with another camera.")
+                raise InputError(
+                    f"{onto}: was made with another camera.", code="PNT-USE-027"
+                )
             result, found = join_map(mapper, known)
         report = session_report(mapper, result)
         if onto is not None:
@@ -154,17 +159,20 @@ def mapper_config(overrides: list[str] | None) -> MapperConfig:
         if not equals or name not in kinds:
             known = ", ".join(kinds)
             raise InputError(
-                f"--set {word}: expected mapping.KEY=VALUE, KEY of {known}."
+                f"--set {word}: expected mapping.KEY=VALUE, KEY of {known}.",
+                code="PNT-USE-028",
             )
         try:
             values[name] = kinds[name](text)
         except ValueError:
-            raise InputError(f"--set {word}: {text!r} is no number.") from None
+            raise InputError(
+                f"--set {word}: {text!r} is no number.", code="PNT-USE-029"
+            ) from None
     config = MapperConfig(**values)
     try:
         config.validate()
     except ValueError as error:
-        raise InputError(f"--set: {error}") from error
+        raise InputError(f"--set: {error}", code="PNT-USE-030") from error
     return config
 
 
@@ -175,11 +183,11 @@ def open_map(path: Path) -> MapStore:
         InputError: There is none, or it holds no keyframes.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such file.")
+        raise InputError(f"{path}: no such file.", code="PNT-USE-031")
     store = MapStore(path)
     if store.intrinsics is None or not len(store):
         store.close()
-        raise InputError(f"{path}: holds no keyframes.")
+        raise InputError(f"{path}: holds no keyframes.", code="PNT-USE-032")
     return store
 
 

@@ -69,7 +69,9 @@ def place(
     """
     job = load_scenario(scenario, overrides or ())
     if scene is not None and wall is not None:
-        raise InputError("--wall and --scene: only one of them can be given.")
+        raise InputError(
+            "--wall and --scene: only one of them can be given.", code="PNT-USE-033"
+        )
     what = f"--wall {wall!r}" if scene is None else f"--scene {scene!r}"
     if scene is None:
         width, height = _size(wall or "2x2")
@@ -95,7 +97,7 @@ def place(
             zones=zones,
         )
     except ValueError as error:
-        raise InputError(f"{what}: {error}") from error
+        raise InputError(f"{what}: {error}", code="PNT-USE-034") from error
     document = {
         "units": "m, on the wall from its lower left corner; strokes in T",
         "distance": spot.distance,
@@ -132,7 +134,9 @@ def _size(wall: str) -> tuple[float, float]:
     """Reads a wall's width and height, m, from the command line."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)", wall)
     if found is None or not min(map(float, found.groups())) > 0.0:
-        raise InputError(f"--wall {wall!r}: expected WxH in metres, e.g. 10x6.")
+        raise InputError(
+            f"--wall {wall!r}: expected WxH in metres, e.g. 10x6.", code="PNT-USE-035"
+        )
     return float(found[1]), float(found[2])
 
 

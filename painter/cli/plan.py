@@ -97,7 +97,9 @@ def plan(
         InputError: The options do not go together or name nothing to be read.
     """
     if touch_up is not None and mark is not None:
-        raise InputError("--touch-up and --mark: only one of them can be given.")
+        raise InputError(
+            "--touch-up and --mark: only one of them can be given.", code="PNT-USE-036"
+        )
     job = load_scenario(scenario, overrides or ())
     tile = job.tile
     job.raster.zones += operator_zones(include, exclude, tile.width, tile.height)

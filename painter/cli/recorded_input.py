@@ -45,7 +45,9 @@ def parse_direction(words: str) -> FloatArray:
     vector = _numbers(words)
     length = float(np.linalg.norm(vector)) if vector is not None else 0.0
     if vector is None or not 0.0 < length < math.inf:
-        raise InputError(f"--up must be x, -x, ... -z or X,Y,Z, got {words!r}.")
+        raise InputError(
+            f"--up must be x, -x, ... -z or X,Y,Z, got {words!r}.", code="PNT-USE-037"
+        )
     return vector / length
 
 
@@ -63,7 +65,9 @@ def parse_point(words: str) -> FloatArray:
     """
     point = _numbers(words)
     if point is None:
-        raise InputError(f"--viewpoint must be X,Y,Z in m, got {words!r}.")
+        raise InputError(
+            f"--viewpoint must be X,Y,Z in m, got {words!r}.", code="PNT-USE-038"
+        )
     return point
 
 
@@ -82,9 +86,11 @@ def parse_tile(words: str) -> tuple[float, float]:
     try:
         width, height = (float(word) for word in words.lower().split("x"))
     except ValueError:
-        raise InputError(f"--tile must be WxH in m, e.g. 2x2, got {words!r}.") from None
+        raise InputError(
+            f"--tile must be WxH in m, e.g. 2x2, got {words!r}.", code="PNT-USE-039"
+        ) from None
     if not (0.0 < width < math.inf and 0.0 < height < math.inf):
-        raise InputError(f"--tile must be > 0 m, got {words!r}.")
+        raise InputError(f"--tile must be > 0 m, got {words!r}.", code="PNT-USE-040")
     return width, height
 
 
@@ -107,15 +113,19 @@ def read_input(path: Path, *, intrinsics: Path | None, unit: Unit) -> RecordedCl
     if path.is_dir() or suffix == DEPTH_SUFFIX:
         images = _depth_images(path) if path.is_dir() else [path]
         if not path.is_dir() and not path.exists():
-            raise InputError(f"{path}: no such file.")
+            raise InputError(f"{path}: no such file.", code="PNT-USE-041")
         beside = images[0].with_name(INTRINSICS_NAME)
         camera = beside if intrinsics is None and beside.exists() else intrinsics
         if camera is None:
-            raise InputError(f"{path}: a depth image needs --intrinsics JSON.")
+            raise InputError(
+                f"{path}: a depth image needs --intrinsics JSON.", code="PNT-USE-042"
+            )
         _refuse_unit(path, unit)
         return RecordedCloud(p_WQs=read_depth_frames(images, camera))
     if intrinsics is not None:
-        raise InputError(f"--intrinsics is for a depth PNG; {path} is none.")
+        raise InputError(
+            f"--intrinsics is for a depth PNG; {path} is none.", code="PNT-USE-043"
+        )
     if suffix in BAG_SUFFIXES:
         _refuse_unit(path, unit)
         return RecordedCloud(p_WQs=read_bag(path))
@@ -140,12 +150,15 @@ def _depth_images(folder: Path) -> list[Path]:
     images = sorted(folder.glob(f"*{DEPTH_SUFFIX}"))
     images = [path for path in images if "depth" in path.name.lower()] or images
     if not images:
-        raise InputError(f"{folder}: there is no {DEPTH_SUFFIX} in this folder.")
+        raise InputError(
+            f"{folder}: there is no {DEPTH_SUFFIX} in this folder.", code="PNT-USE-044"
+        )
     return images
 
 
 def _refuse_unit(path: Path, unit: Unit) -> None:
     if unit is not Unit.M:
         raise InputError(
-            f"--unit is for clouds; {path} has the depth scale of its camera."
+            f"--unit is for clouds; {path} has the depth scale of its camera.",
+            code="PNT-USE-045",
         )

@@ -135,7 +135,9 @@ def segment(
         max_range=max_range,
     )
     if not 0.0 <= set_back < math.inf:
-        raise InputError(f"--set-back must be >= 0 m, got {set_back!r}.")
+        raise InputError(
+            f"--set-back must be >= 0 m, got {set_back!r}.", code="PNT-USE-046"
+        )
     words = list(overrides or ())
     if cell is not None:
         words.append(f"segmentation.cell={cell!r}")
@@ -186,7 +188,9 @@ def _check_positive(**values: float | None) -> None:
     for name, value in values.items():
         if value is not None and not 0.0 < value < math.inf:
             option = "--" + name.replace("_", "-")
-            raise InputError(f"{option} must be > 0 m, got {value!r}.")
+            raise InputError(
+                f"{option} must be > 0 m, got {value!r}.", code="PNT-USE-047"
+            )
 
 
 def _is_set(words: list[str], field: str) -> bool:
@@ -198,12 +202,14 @@ def _check_grid(width: float, height: float, config: SegmentationConfig) -> None
     cell = config.cell
     if min(width, height) < cell:
         raise InputError(
-            f"--tile {width:g}x{height:g} is smaller than a cell, {cell:g} m."
+            f"--tile {width:g}x{height:g} is smaller than a cell, {cell:g} m.",
+            code="PNT-USE-048",
         )
     if width * height / cell**2 > MAX_CELLS:
         raise InputError(
             f"--tile {width:g}x{height:g} with cells of {cell:g} m has more than "
-            f"{MAX_CELLS:.0e} cells; take a larger --cell."
+            f"{MAX_CELLS:.0e} cells; take a larger --cell.",
+            code="PNT-USE-049",
         )
 
 

@@ -142,7 +142,9 @@ def simulate(
     else:
         print_summary(figures, out)
     if log.status.phase != Phase.DONE:
-        raise FaultError(f"{log.status.phase.value}: {log.status.cause}")
+        raise FaultError(
+            f"{log.status.phase.value}: {log.status.cause}", code="PNT-USE-050"
+        )
 
 
 def _earlier(
@@ -156,15 +158,23 @@ def _earlier(
     """Returns the run that is gone on with, if any."""
     run = resume or touch_up
     if resume is not None and touch_up is not None:
-        raise InputError("--resume and --touch-up: only one of them can be given.")
+        raise InputError(
+            "--resume and --touch-up: only one of them can be given.",
+            code="PNT-USE-051",
+        )
     if clear is not None and touch_up is None:
-        raise InputError("--clear: goes with --touch-up alone.")
+        raise InputError("--clear: goes with --touch-up alone.", code="PNT-USE-052")
     if run is None:
         return None
     if scenario is not None:
-        raise InputError(f"{scenario}: the scenario is that of {run}; give none.")
+        raise InputError(
+            f"{scenario}: the scenario is that of {run}; give none.", code="PNT-USE-053"
+        )
     if out.resolve() == run.resolve():
-        raise InputError(f"--out {out}: is the run to be gone on with; give another.")
+        raise InputError(
+            f"--out {out}: is the run to be gone on with; give another.",
+            code="PNT-USE-054",
+        )
     if resume is not None:
         return EarlierRun.to_resume(resume, words)
     corners = None if clear is None else mark_corners("--clear", clear)

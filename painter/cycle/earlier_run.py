@@ -73,7 +73,10 @@ class EarlierRun:
         seen = film_around(run, wall, film.thickness)
         strokes = MakeProgramPlanner(job).touch_up_strokes(wall, seen)
         if not strokes:
-            raise InputError(f"{path}: the film is thin nowhere; nothing to mend.")
+            raise InputError(
+                f"{path}: the film is thin nowhere; nothing to mend.",
+                code="PNT-CYCLE-001",
+            )
         return cls(job, Remainder(segmentation=wall, strokes=strokes), film)
 
 
@@ -84,7 +87,10 @@ def _job(path: Path, overrides: Sequence[str]) -> Scenario:
     for name in _SAME:
         old, new = getattr(before, name), getattr(job, name)
         if new != old:
-            raise InputError(f"--set {name}: must be that of {path}, {old}, got {new}.")
+            raise InputError(
+                f"--set {name}: must be that of {path}, {old}, got {new}.",
+                code="PNT-CYCLE-002",
+            )
     return job
 
 

@@ -73,10 +73,14 @@ class HilBench:
         folder = RunFolder.open(run)
         segmentation = folder.segmentation()
         if segmentation is None:
-            raise InputError(f"{run / SEGMENTATION}: no such file; no truth was added.")
+            raise InputError(
+                f"{run / SEGMENTATION}: no such file; no truth was added.",
+                code="PNT-REHEARSAL-001",
+            )
         if truth.lost:
             raise PainterError(
-                f"the world missed {truth.lost} samples of the arm: no film was added."
+                f"the world missed {truth.lost} samples of the arm: no film was added.",
+                code="PNT-REHEARSAL-002",
             )
         write_truth(folder, self._job, segmentation, truth.film)
         started = named(folder.events(), STARTED)

@@ -111,12 +111,17 @@ class WorldProcess:
     def _receive(self) -> object:
         try:
             if not self._pipe.poll(_PATIENCE):
-                raise PainterError(f"the simulated world is silent for {_PATIENCE} s.")
+                raise PainterError(
+                    f"the simulated world is silent for {_PATIENCE} s.",
+                    code="PNT-REHEARSAL-003",
+                )
             answer = self._pipe.recv()
         except (EOFError, OSError):
-            raise PainterError("the simulated world has ended.") from None
+            raise PainterError(
+                "the simulated world has ended.", code="PNT-REHEARSAL-004"
+            ) from None
         if isinstance(answer, str) and answer:
-            raise PainterError(answer)
+            raise PainterError(answer, code="PNT-REHEARSAL-005")
         return answer
 
 

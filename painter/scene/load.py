@@ -44,15 +44,21 @@ def load_scene(name: str, seed: int) -> Scene:
         path = models_path("scenes", f"{name}{_SUFFIX}")
         if not path.is_file():
             known = ", ".join([*named_scenes(), "random"])
-            raise InputError(f"scene {name!r} is unknown; known are: {known}.")
+            raise InputError(
+                f"scene {name!r} is unknown; known are: {known}.", code="PNT-SCENE-001"
+            )
     try:
         document = yaml.safe_load(path.read_text())
     except FileNotFoundError:
-        raise InputError(f"{path}: no such scene file.") from None
+        raise InputError(f"{path}: no such scene file.", code="PNT-SCENE-002") from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+        raise InputError(
+            f"{path}: {' '.join(str(error).split())}", code="PNT-SCENE-003"
+        ) from error
     if not isinstance(document, dict) or len(document) != 1:
-        raise InputError(f"{path}: expected one top key, the scene's name.")
+        raise InputError(
+            f"{path}: expected one top key, the scene's name.", code="PNT-SCENE-004"
+        )
     ((top, fields),) = document.items()
     try:
         if fields is None:
@@ -64,7 +70,7 @@ def load_scene(name: str, seed: int) -> Scene:
         )
         scene.validate()
     except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{path}: {error}", code="PNT-SCENE-005") from error
     return scene
 
 

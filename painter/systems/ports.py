@@ -30,6 +30,7 @@ def EvalAs(port: InputPort | OutputPort, context: Context, kind: type[T]) -> T:
         name = port.get_system().GetSystemPathname()
         raise PortTypeError(
             f"{name}:{port.get_name()} carries {type(value).__name__}, "
-            f"expected {kind.__name__}."
+            f"expected {kind.__name__}.",
+            code="PNT-CYCLE-010",
         )
     return value

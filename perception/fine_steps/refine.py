@@ -88,7 +88,9 @@ def refine_segmentation(
                 fine.depth, near, cell=cell / split, rng=np.random.default_rng(seed)
             )
     except ValueError as error:
-        raise NoWallError(f"the wall has no surface on the tile: {error}") from error
+        raise NoWallError(
+            f"the wall has no surface on the tile: {error}", code="PNT-WALL-001"
+        ) from error
     steps = find_steps(fine, surface, cell=cell / split, config=config)
     votes = point_votes(fine, steps, surface)
     share = wall_share(votes, (ny, nx), cell=cell, spacing=spacing)
@@ -108,7 +110,8 @@ def refine_segmentation(
     if not mask.any():
         raise NoWallError(
             f"nothing of {config.min_region_area:g} m² on the {nx * cell:g} x "
-            f"{ny * cell:g} m tile is level with the wall."
+            f"{ny * cell:g} m tile is level with the wall.",
+            code="PNT-WALL-002",
         )
     middle = (slice(split // 2, None, split),) * 2
     return dataclasses.replace(

@@ -71,20 +71,22 @@ def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
     if importlib.util.find_spec("pyrealsense2") is None:
         raise CloudReadError(
             f"{path}: reading RealSense recordings needs pyrealsense2; "
-            "install it with: pip install 'painter[hardware]'."
+            "install it with: pip install 'painter[hardware]'.",
+            code="PNT-FRAMES-001",
         )
     words = [sys.executable, "-m", module, str(path), str(out)]
     try:
         done = subprocess.run(words, capture_output=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired as error:
         raise CloudReadError(
-            f"{path}: librealsense took over {timeout:g} s."
+            f"{path}: librealsense took over {timeout:g} s.", code="PNT-FRAMES-002"
         ) from error
     if done.returncode != 0 or not out.exists():
         reason = done.stderr.decode(errors="replace").strip().splitlines()
         raise CloudReadError(
             f"{path}: librealsense cannot read it: "
-            f"{reason[-1] if reason else f'it ended with {done.returncode}'}."
+            f"{reason[-1] if reason else f'it ended with {done.returncode}'}.",
+            code="PNT-FRAMES-003",
         )
 
 

@@ -59,7 +59,8 @@ def read_cloud(path: Path) -> RecordedCloud:
     if suffix not in CLOUD_SUFFIXES:
         known = ", ".join(CLOUD_SUFFIXES)
         raise CloudReadError(
-            f"{path}: unknown cloud format {suffix!r}; known: {known}."
+            f"{path}: unknown cloud format {suffix!r}; known: {known}.",
+            code="PNT-CLOUD-001",
         )
     check_file(path)
     place = None
@@ -103,14 +104,16 @@ def check_file(path: Path) -> None:
     """
     if not path.is_file():
         reason = "is a folder" if path.is_dir() else "no such file"
-        raise CloudReadError(f"{path}: {reason}.")
+        raise CloudReadError(f"{path}: {reason}.", code="PNT-CLOUD-002")
     try:
         with path.open("rb") as file:
             empty = not file.read(1)
     except OSError as error:
-        raise CloudReadError(f"{path}: {error.strerror}.") from error
+        raise CloudReadError(
+            f"{path}: {error.strerror}.", code="PNT-CLOUD-003"
+        ) from error
     if empty:
-        raise CloudReadError(f"{path}: the file is empty.")
+        raise CloudReadError(f"{path}: the file is empty.", code="PNT-CLOUD-004")
 
 
 def checked_points(path: Path, points: FloatArray) -> FloatArray:
@@ -128,12 +131,15 @@ def checked_points(path: Path, points: FloatArray) -> FloatArray:
     """
     count = points.shape[1]
     if count == 0:
-        raise CloudReadError(f"{path}: the cloud has no points.")
+        raise CloudReadError(f"{path}: the cloud has no points.", code="PNT-CLOUD-005")
     if count > MAX_POINTS:
-        raise CloudReadError(f"{path}: {count} points are over {MAX_POINTS}.")
+        raise CloudReadError(
+            f"{path}: {count} points are over {MAX_POINTS}.", code="PNT-CLOUD-006"
+        )
     if not np.any(np.all(np.isfinite(points), axis=0)):
         raise CloudReadError(
-            f"{path}: none of the {count} points is finite (NaN or infinite)."
+            f"{path}: none of the {count} points is finite (NaN or infinite).",
+            code="PNT-CLOUD-007",
         )
     return np.ascontiguousarray(points, dtype=np.float64)
 
@@ -144,7 +150,9 @@ def _read_fields(path: Path) -> tuple[npt.NDArray[Any], CloudHeader]:
     try:
         header = parse(data)
     except (KeyError, ValueError, IndexError) as error:
-        raise CloudReadError(f"{path}: damaged header: {error}.") from error
+        raise CloudReadError(
+            f"{path}: damaged header: {error}.", code="PNT-CLOUD-008"
+        ) from error
     if header.form == "ascii":
         return _text_fields(path, data[header.size :], header), header
     body = memoryview(data)[header.size :]
@@ -154,7 +162,8 @@ def _read_fields(path: Path) -> tuple[npt.NDArray[Any], CloudHeader]:
     if len(body) < size:
         raise CloudReadError(
             f"{path}: truncated: the header promises {header.count} points in "
-            f"{size} bytes, the file has {len(body)}."
+            f"{size} bytes, the file has {len(body)}.",
+            code="PNT-CLOUD-009",
         )
     if header.form == "binary":
         return np.frombuffer(body[:size], dtype=header.point), header
@@ -174,18 +183,22 @@ def _decompressed(path: Path, body: memoryview, header: CloudHeader) -> bytes:
     if len(body) < 8 + packed:
         raise CloudReadError(
             f"{path}: truncated: the header promises {header.count} points in "
-            f"{8 + packed} bytes, the file has {len(body)}."
+            f"{8 + packed} bytes, the file has {len(body)}.",
+            code="PNT-CLOUD-010",
         )
     expected = header.count * header.point.itemsize
     if size != expected or size > _LZF_MOST * packed:
         raise CloudReadError(
             f"{path}: damaged: {packed} bytes cannot be {size} bytes of "
-            f"{header.count} points ({expected} bytes)."
+            f"{header.count} points ({expected} bytes).",
+            code="PNT-CLOUD-011",
         )
     try:
         return lzf_decompress(bytes(body[8 : 8 + packed]), size)
     except ValueError as error:
-        raise CloudReadError(f"{path}: the compressed data {error}.") from error
+        raise CloudReadError(
+            f"{path}: the compressed data {error}.", code="PNT-CLOUD-012"
+        ) from error
 
 
 def _text_fields(path: Path, body: bytes, header: CloudHeader) -> npt.NDArray[Any]:
@@ -193,7 +206,8 @@ def _text_fields(path: Path, body: bytes, header: CloudHeader) -> npt.NDArray[An
     if len(lines) < header.count:
         raise CloudReadError(
             f"{path}: truncated: the header promises {header.count} points, the "
-            f"file has {len(lines)} lines of data."
+            f"file has {len(lines)} lines of data.",
+            code="PNT-CLOUD-013",
         )
     fields = np.zeros(header.count, dtype=header.point)
     if header.count == 0:
@@ -207,7 +221,8 @@ def _text_fields(path: Path, body: bytes, header: CloudHeader) -> npt.NDArray[An
         column += width
         if block.shape[1] < width:
             raise CloudReadError(
-                f"{path}: a line has {numbers.shape[1]} numbers, too few for {name}."
+                f"{path}: a line has {numbers.shape[1]} numbers, too few for {name}.",
+                code="PNT-CLOUD-014",
             )
         if kind.base.kind in "iu":  # A colour may be written as -1 or NaN.
             block = np.nan_to_num(block, nan=0.0, posinf=0.0, neginf=0.0)
@@ -228,7 +243,7 @@ def _read_xyz(path: Path) -> FloatArray:
         del lines[0]
     lines = [line for line in lines if not line.lstrip().startswith((b"#", b"//"))]
     if not lines:
-        raise CloudReadError(f"{path}: the cloud has no points.")
+        raise CloudReadError(f"{path}: the cloud has no points.", code="PNT-CLOUD-015")
     return _numbers(path, lines, columns=(0, 1, 2)).T
 
 
@@ -239,7 +254,9 @@ def _numbers(
         words = [line.decode("ascii") for line in lines]
         return np.loadtxt(words, usecols=columns, ndmin=2, comments=None)
     except (ValueError, IndexError, OverflowError) as error:
-        raise CloudReadError(f"{path}: not lines of x, y and z: {error}.") from error
+        raise CloudReadError(
+            f"{path}: not lines of x, y and z: {error}.", code="PNT-CLOUD-016"
+        ) from error
 
 
 def _read_array(path: Path) -> FloatArray:
@@ -257,7 +274,9 @@ def _read_array(path: Path) -> FloatArray:
         zipfile.BadZipFile,
         zlib.error,
     ) as error:
-        raise CloudReadError(f"{path}: cannot read the array: {error}.") from error
+        raise CloudReadError(
+            f"{path}: cannot read the array: {error}.", code="PNT-CLOUD-017"
+        ) from error
     if content.ndim == 2 and content.dtype.kind in "fiu":
         if content.shape[1] == 3:
             return np.asarray(content.T, dtype=np.float64)
@@ -265,7 +284,8 @@ def _read_array(path: Path) -> FloatArray:
             return np.asarray(content, dtype=np.float64)
     raise CloudReadError(
         f"{path}: expected numbers of shape (N, 3) or (3, N), "
-        f"got {content.dtype} of shape {content.shape}."
+        f"got {content.dtype} of shape {content.shape}.",
+        code="PNT-CLOUD-018",
     )
 
 
@@ -276,7 +296,8 @@ def _lone_member(path: Path) -> npt.NDArray[Any]:
         if len(names) != 1:
             raise CloudReadError(
                 f'{path}: expected one array, or one named "points", "xyz" or '
-                f'"p_WQs", found {", ".join(names) or "none"}.'
+                f'"p_WQs", found {", ".join(names) or "none"}.',
+                code="PNT-CLOUD-019",
             )
         info = members[names[0]]
         if info.file_size > 24 * MAX_POINTS:

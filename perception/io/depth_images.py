@@ -144,18 +144,25 @@ def read_intrinsics(path: Path) -> DepthCamera:
     try:
         camera: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise CloudReadError(f"{path}: not JSON: {error}") from error
+        raise CloudReadError(
+            f"{path}: not JSON: {error}", code="PNT-FRAMES-004"
+        ) from error
     if not isinstance(camera, dict):
-        raise CloudReadError(f"{path}: expected a JSON object.")
+        raise CloudReadError(f"{path}: expected a JSON object.", code="PNT-FRAMES-005")
     camera = {"depth_scale_m_per_unit": 0.001} | camera
     positive = ("width", "height", "fx", "fy", "depth_scale_m_per_unit")
     values = {}
     for name in (*positive, "cx", "cy"):
         value = camera.get(name)
         if not _is_number(value):
-            raise CloudReadError(f"{path}: {name} must be a number, got {value!r:.60}.")
+            raise CloudReadError(
+                f"{path}: {name} must be a number, got {value!r:.60}.",
+                code="PNT-FRAMES-006",
+            )
         if name in positive and value <= 0:
-            raise CloudReadError(f"{path}: {name} must be > 0, got {value!r}.")
+            raise CloudReadError(
+                f"{path}: {name} must be > 0, got {value!r}.", code="PNT-FRAMES-007"
+            )
         values[name] = value
     coefficients: Any = camera.get("distortion_k1k2p1p2k3", [0.0] * 5)
     if (
@@ -165,7 +172,8 @@ def read_intrinsics(path: Path) -> DepthCamera:
     ):
         raise CloudReadError(
             f"{path}: distortion_k1k2p1p2k3 must be 5 numbers, "
-            f"got {coefficients!r:.60}."
+            f"got {coefficients!r:.60}.",
+            code="PNT-FRAMES-008",
         )
     return DepthCamera(**values, distortion_k1k2p1p2k3=tuple(coefficients))
 
@@ -184,10 +192,13 @@ def _read_image(path: Path, camera: DepthCamera, camera_path: Path) -> _DepthIma
             if (width, height) != (camera.width, camera.height):
                 raise CloudReadError(
                     f"{path}: the image is {width} x {height} px, {camera_path} is for "
-                    f"{camera.width} x {camera.height} px."
+                    f"{camera.width} x {camera.height} px.",
+                    code="PNT-FRAMES-009",
                 )
             if width * height > _MAX_PIXELS:
-                raise CloudReadError(f"{path}: over {_MAX_PIXELS} px.")
+                raise CloudReadError(
+                    f"{path}: over {_MAX_PIXELS} px.", code="PNT-FRAMES-010"
+                )
             mode, depth = image.mode, np.asarray(image)
     # Pillow raises this and that for damaged files.
     except (
@@ -200,9 +211,14 @@ def _read_image(path: Path, camera: DepthCamera, camera_path: Path) -> _DepthIma
         EOFError,
         Image.DecompressionBombError,
     ) as error:
-        raise CloudReadError(f"{path}: cannot read the picture: {error}.") from error
+        raise CloudReadError(
+            f"{path}: cannot read the picture: {error}.", code="PNT-FRAMES-011"
+        ) from error
     if depth.ndim != 2 or depth.dtype.itemsize < 2 or depth.dtype.kind not in "iu":
-        raise CloudReadError(f"{path}: expected 16-bit grey depth, got mode {mode!r}.")
+        raise CloudReadError(
+            f"{path}: expected 16-bit grey depth, got mode {mode!r}.",
+            code="PNT-FRAMES-012",
+        )
     return depth.astype(np.uint16)
 
 

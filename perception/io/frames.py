@@ -84,7 +84,9 @@ class Recording:
             depth = _read_image(entry.depth, cv2.IMREAD_UNCHANGED)
             color = _read_image(entry.color, cv2.IMREAD_COLOR)
             if depth.dtype != np.uint16 or depth.ndim != 2:
-                raise CloudReadError(f"{entry.depth}: expected 16-bit grey depth.")
+                raise CloudReadError(
+                    f"{entry.depth}: expected 16-bit grey depth.", code="PNT-FRAMES-013"
+                )
             depth_mm = np.rint(depth * self.depth_unit_mm).astype(np.uint16)
             yield Frame(entry.time, depth_mm, color[:, :, ::-1].copy(), entry.X_WC)
 
@@ -108,7 +110,7 @@ def open_recording(
         CloudReadError: A file is missing or unusable; names the file and the reason.
     """
     if not folder.is_dir():
-        raise CloudReadError(f"{folder}: no such folder.")
+        raise CloudReadError(f"{folder}: no such folder.", code="PNT-FRAMES-014")
     intrinsics, unit_mm = _read_camera(folder)
     if (folder / "depth.txt").is_file():
         source = poses or folder / ARM_FILE
@@ -122,7 +124,8 @@ def open_recording(
     if not entries:
         raise CloudReadError(
             f"{folder}: no frames; expected rgb.txt and depth.txt, or frame-N.depth.png"
-            " or depth_N.png."
+            " or depth_N.png.",
+            code="PNT-FRAMES-015",
         )
     return Recording(intrinsics, unit_mm or 1.0, tuple(entries))
 
@@ -187,7 +190,7 @@ def read_poses(path: Path) -> list[tuple[float, RigidTransform]]:
         CloudReadError: The file is missing or a line is no pose; names the line.
     """
     if not path.is_file():
-        raise CloudReadError(f"{path}: no such file.")
+        raise CloudReadError(f"{path}: no such file.", code="PNT-FRAMES-016")
     poses = []
     for number, line in enumerate(path.read_text().splitlines(), 1):
         words = line.split()
@@ -198,18 +201,19 @@ def read_poses(path: Path) -> list[tuple[float, RigidTransform]]:
             R = RotationMatrix(Rotation.from_quat([qx, qy, qz, qw]).as_matrix())
         except ValueError as error:
             raise CloudReadError(
-                f"{path}: line {number} is no pose (time, x y z, qx qy qz qw)."
+                f"{path}: line {number} is no pose (time, x y z, qx qy qz qw).",
+                code="PNT-FRAMES-017",
             ) from error
         poses.append((time, RigidTransform(R, [x, y, z])))
     if not poses:
-        raise CloudReadError(f"{path}: holds no poses.")
+        raise CloudReadError(f"{path}: holds no poses.", code="PNT-FRAMES-018")
     return poses
 
 
 def _read_image(path: Path, mode: int) -> npt.NDArray[Any]:
     image = cv2.imread(str(path), mode)
     if image is None:
-        raise CloudReadError(f"{path}: missing or no picture.")
+        raise CloudReadError(f"{path}: missing or no picture.", code="PNT-FRAMES-019")
     return np.asarray(image)
 
 
@@ -218,7 +222,10 @@ def _read_camera(folder: Path) -> tuple[CameraIntrinsics, float | None]:
         for parent in (folder, folder.parent):
             if (parent / name).is_file():
                 return _parse_camera(parent / name)
-    raise CloudReadError(f"{folder}: no {CAMERA_FILE} (width, height, fx, fy, cx, cy).")
+    raise CloudReadError(
+        f"{folder}: no {CAMERA_FILE} (width, height, fx, fy, cx, cy).",
+        code="PNT-FRAMES-020",
+    )
 
 
 def _parse_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
@@ -229,14 +236,19 @@ def _parse_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
         scale = fields.get("depth_scale_m_per_unit")
         unit_mm = None if scale is None else 1000.0 * float(scale)
     except (ValueError, TypeError, KeyError) as error:
-        raise CloudReadError(f"{path}: no camera: {error!r}.") from error
+        raise CloudReadError(
+            f"{path}: no camera: {error!r}.", code="PNT-FRAMES-021"
+        ) from error
     for name, value in (sizes | lengths).items():
         if not (np.isfinite(value) and value > 0):
-            raise CloudReadError(f"{path}: {name} must be > 0, got {value!r}.")
+            raise CloudReadError(
+                f"{path}: {name} must be > 0, got {value!r}.", code="PNT-FRAMES-022"
+            )
     for name, side in (("cx", "width"), ("cy", "height")):
         if lengths[name] >= sizes[side]:
             raise CloudReadError(
-                f"{path}: {name} must be < {side} {sizes[side]}, got {lengths[name]!r}."
+                f"{path}: {name} must be < {side} {sizes[side]}, got {lengths[name]}.",
+                code="PNT-FRAMES-023",
             )
     camera = CameraIntrinsics(**lengths, width=sizes["width"], height=sizes["height"])
     return camera, unit_mm
@@ -244,14 +256,16 @@ def _parse_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
 
 def _read_list(path: Path) -> tuple[FloatArray, list[Path]]:
     if not path.is_file():
-        raise CloudReadError(f"{path}: no such file.")
+        raise CloudReadError(f"{path}: no such file.", code="PNT-FRAMES-024")
     rows = [line.split() for line in path.read_text().splitlines()]
     rows = [row for row in rows if row and not row[0].startswith("#")]
     try:
         times = np.array([float(row[0]) for row in rows])
         return times, [path.parent / row[1] for row in rows]
     except (ValueError, IndexError) as error:
-        raise CloudReadError(f"{path}: expected lines of time and file.") from error
+        raise CloudReadError(
+            f"{path}: expected lines of time and file.", code="PNT-FRAMES-025"
+        ) from error
 
 
 def _tum_entries(
@@ -317,5 +331,7 @@ def _read_matrix(path: Path) -> RigidTransform:
         matrix = np.loadtxt(path).reshape(4, 4)
         R = RotationMatrix.ProjectToRotationMatrix(matrix[:3, :3])
     except (ValueError, RuntimeError) as error:
-        raise CloudReadError(f"{path}: no 4 x 4 pose: {error}.") from error
+        raise CloudReadError(
+            f"{path}: no 4 x 4 pose: {error}.", code="PNT-FRAMES-026"
+        ) from error
     return RigidTransform(R, matrix[:3, 3])

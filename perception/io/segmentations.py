@@ -67,36 +67,45 @@ def load_segmentation(path: Path) -> WallSegmentation:
             file and the field.
     """
     if not path.is_file():
-        raise CloudReadError(f"{path}: no such file.")
+        raise CloudReadError(f"{path}: no such file.", code="PNT-SEGMENT-001")
     try:
         file = np.load(path, allow_pickle=False)
         # A lone array, from a .npy file, has no names.
         missing = [name for name in _FIELDS if name not in getattr(file, "files", ())]
         if missing:
-            raise CloudReadError(f"{path}: no segmentation: {missing[0]} is missing.")
+            raise CloudReadError(
+                f"{path}: no segmentation: {missing[0]} is missing.",
+                code="PNT-SEGMENT-002",
+            )
         content = {name: file[name] for name in _FIELDS}
         extras = {name: file[name] for name in _EXTRAS if name in file.files}
         openings = _openings({name: file[name] for name in _OPENINGS if name in file})
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise CloudReadError(f"{path}: no segmentation: {error}") from error
+        raise CloudReadError(
+            f"{path}: no segmentation: {error}", code="PNT-SEGMENT-003"
+        ) from error
     labels = content["labels"]
     for name in ("labels", "depth", "wall_mask"):
         if content[name].ndim != 2 or content[name].shape != labels.shape:
             raise CloudReadError(
                 f"{path}: {name} has shape {content[name].shape}, "
-                f"labels {labels.shape}; both must be (ny, nx)."
+                f"labels {labels.shape}; both must be (ny, nx).",
+                code="PNT-SEGMENT-004",
             )
     for name, grid in extras.items():
         if grid.shape[:2] != labels.shape:
             raise CloudReadError(
-                f"{path}: {name} has shape {grid.shape}, labels {labels.shape}."
+                f"{path}: {name} has shape {grid.shape}, labels {labels.shape}.",
+                code="PNT-SEGMENT-005",
             )
     matrix = content["X_WT"]
     if matrix.shape != (4, 4) or not _is_rotation(matrix[:3, :3]):
-        raise CloudReadError(f"{path}: X_WT is no pose.")
+        raise CloudReadError(f"{path}: X_WT is no pose.", code="PNT-SEGMENT-006")
     cell = float(content["cell"])
     if not (np.isfinite(cell) and cell > 0.0):
-        raise CloudReadError(f"{path}: cell must be > 0 m, got {cell!r}.")
+        raise CloudReadError(
+            f"{path}: cell must be > 0 m, got {cell!r}.", code="PNT-SEGMENT-007"
+        )
     return WallSegmentation(
         labels=labels.astype(np.uint16),
         depth=content["depth"].astype(np.float32),

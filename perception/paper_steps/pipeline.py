@@ -152,7 +152,8 @@ def segment_tile(
     if not wall_mask.any():
         raise NoWallError(
             f"the wall's plane has no region of {config.min_region_area:g} m² on the "
-            f"{width:g} x {height:g} m tile."
+            f"{width:g} x {height:g} m tile.",
+            code="PNT-WALL-003",
         )
     segmentation = WallSegmentation(
         labels=sort_by_area(absorbed).astype(np.uint16),

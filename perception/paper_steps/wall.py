@@ -95,7 +95,8 @@ def finite_points(p_WQs: FloatArray) -> BoolArray:
     if count < MIN_POINTS:
         raise NoWallError(
             f"the cloud has {count} finite points of {finite.size}; "
-            f"a wall needs at least {MIN_POINTS}."
+            f"a wall needs at least {MIN_POINTS}.",
+            code="PNT-WALL-004",
         )
     return finite
 
@@ -191,15 +192,19 @@ def choose_plane(
                 raise AmbiguousWallError(
                     f"two planes {apart:.3f} m apart are about equally good walls, "
                     f"{good[0].count / total:.0%} and {other.count / total:.0%} of the "
-                    "points; the expected distance of the wall must tell them apart."
+                    "points; the expected distance of the wall must tell them apart.",
+                    code="PNT-WALL-005",
                 )
     if good:
         return next(i for i, plane in enumerate(planes) if plane is good[0])
     if not planes:
-        raise NoWallError(f"there is no plane among {total} points.")
+        raise NoWallError(
+            f"there is no plane among {total} points.", code="PNT-WALL-006"
+        )
     if not upright:
         raise NoWallError(
-            f"all {len(planes)} planes are level, as floors are; none is a wall."
+            f"all {len(planes)} planes are level, as floors are; none is a wall.",
+            code="PNT-WALL-007",
         )
     largest = max(upright, key=lambda plane: plane.count)
     distance, angle = offs[id(largest)]
@@ -212,7 +217,8 @@ def choose_plane(
         f"no plane with {config.min_wall_share:.0%} or more of the points is within "
         f"{limit:g} m and {config.wall_angle_tolerance_deg:g} deg of the expected "
         f"wall; the largest of {len(upright)} has {largest.count / total:.0%} "
-        f"of the points, {place} and is turned {math.degrees(angle):.1f} deg from it."
+        f"of the points, {place} and is turned {math.degrees(angle):.1f} deg from it.",
+        code="PNT-WALL-011" if oblique else "PNT-WALL-012",
     )
 
 

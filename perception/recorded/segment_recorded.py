@@ -142,7 +142,8 @@ def segment_recorded(
         enough = math.ceil(1e4 * math.sqrt(size[0] * size[1] / most)) / 1e4
         raise GridSizeError(
             f"a tile of {size[0]:g} x {size[1]:g} m with cells of {cell:g} m has more "
-            f"than {most} cells; take a smaller tile or cells of {enough:g} m."
+            f"than {most} cells; take a smaller tile or cells of {enough:g} m.",
+            code="PNT-WALL-008",
         )
     # An extent from the data is a whole number of cells.
     tile = {
@@ -182,7 +183,8 @@ def _without_strays(p_WQs: FloatArray) -> FloatArray:
     if finite.shape[1] == 0:
         raise NoWallError(
             f"the cloud has 0 finite points of {p_WQs.shape[1]}; "
-            f"a wall needs at least {MIN_POINTS}."
+            f"a wall needs at least {MIN_POINTS}.",
+            code="PNT-WALL-009",
         )
     with np.errstate(over="ignore"):
         away = np.abs(finite - np.median(finite, axis=1, keepdims=True))

@@ -58,7 +58,10 @@ def choose_wall(
         if reason is None:
             return number
         reasons.append(f"{found.planes[number].count / total:.0%} of points {reason}")
-    raise NoWallError(f"no plane is a wall: {_listing(reasons) or 'there is none'}.")
+    raise NoWallError(
+        f"no plane is a wall: {_listing(reasons) or 'there is none'}.",
+        code="PNT-WALL-010",
+    )
 
 
 def contrast(plane: Plane, p_WQs: FloatArray, *, threshold: float) -> float:

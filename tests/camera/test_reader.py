@@ -91,7 +91,13 @@ def test_a_picture_that_is_too_old_is_dropped():
     ("steps", "words"),
     [
         (ticking(2), "no picture for 0.3 s"),
-        ([*ticking(2), CameraError("camera X: it was unplugged.")], "was unplugged"),
+        (
+            [
+                *ticking(2),
+                CameraError("camera X: it was unplugged.", code="PNT-TEST-001"),
+            ],
+            "was unplugged",
+        ),
     ],
 )
 def test_a_camera_that_goes_is_opened_again(steps, words):
@@ -113,7 +119,9 @@ def test_tries_are_bounded_and_the_end_is_said():
 
     def fail():
         opened.append(1)
-        raise CameraError("camera: no RealSense device is connected.")
+        raise CameraError(
+            "camera: no RealSense device is connected.", code="PNT-TEST-001"
+        )
 
     with CameraReader(fail, CONFIG) as dut:
         lost = wait_for(dut, lambda r: r.health.state == CameraState.LOST)
@@ -126,7 +134,7 @@ def test_tries_are_bounded_and_the_end_is_said():
 def test_pictures_make_the_tries_count_anew():
     # Each camera gives a picture and goes: never two failures in a row without one.
     def camera():
-        return Script([0.0, CameraError("gone.")])
+        return Script([0.0, CameraError("gone.", code="PNT-TEST-001")])
 
     with CameraReader(camera, CONFIG) as dut:
         wait_for(dut, lambda r: r.health.reconnects > 2 * CONFIG.retries)

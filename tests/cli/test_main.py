@@ -74,11 +74,11 @@ def test_wrong_use_is_one_line_and_exit_2(words, named, command, capsys):
 @pytest.mark.parametrize(
     ("error", "code"),
     [
-        (InputError("cloud.ply: no such file."), 2),
-        (CloudReadError("cloud.ply: truncated."), 2),
-        (NoWallError("no wall."), 1),
-        (FaultError("drive 2."), 1),
-        (PainterError("over\ntwo lines"), 1),
+        (InputError("cloud.ply: no such file.", code="PNT-TEST-001"), 2),
+        (CloudReadError("cloud.ply: truncated.", code="PNT-TEST-001"), 2),
+        (NoWallError("no wall.", code="PNT-TEST-001"), 1),
+        (FaultError("drive 2.", code="PNT-TEST-001"), 1),
+        (PainterError("over\ntwo lines", code="PNT-TEST-001"), 1),
     ],
 )
 def test_errors_of_painters_own_are_one_line(error, code, command, capsys):
@@ -88,9 +88,8 @@ def test_errors_of_painters_own_are_one_line(error, code, command, capsys):
 
     command(plan)
     assert main.run(["plan"]) == code
-    assert (
-        capsys.readouterr().err == f"painter: error: {' '.join(str(error).split())}\n"
-    )
+    text = " ".join(str(error).split())
+    assert capsys.readouterr().err == f"painter: error: {text} [PNT-TEST-001]\n"
 
 
 def test_a_bug_is_not_hidden(command):

@@ -43,7 +43,10 @@ class LogBus:
         self._times = np.array([feedback.time for feedback in self._feedbacks])
         enabled = [f.time for f in self._feedbacks if f.phase == BusState.ENABLED]
         if not enabled:
-            raise InputError("the log holds no time at which all drives are enabled.")
+            raise InputError(
+                "the log holds no time at which all drives are enabled.",
+                code="PNT-BUSLOG-001",
+            )
         self.begin, self.end = enabled[0], float(self._times[-1])
         self._now = self.begin
 

@@ -32,13 +32,15 @@ def load_bus(path: Path) -> BusConfig:
         bus.path = str(path)
         bus.validate()
     except FileNotFoundError:
-        raise InputError(f"{path}: no such bus file.") from None
+        raise InputError(f"{path}: no such bus file.", code="PNT-BUSFILE-001") from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+        raise InputError(
+            f"{path}: {' '.join(str(error).split())}", code="PNT-BUSFILE-002"
+        ) from error
     for name in AXES:
         refusal = mode_problem(bus.drives[name], bus.device(name))
         if refusal:
-            raise InputError(f"{path}: drives.{name}.{refusal}")
+            raise InputError(f"{path}: drives.{name}.{refusal}", code="PNT-BUSFILE-003")
     return bus
 
 

@@ -106,12 +106,14 @@ def read_device(path: Path, node_id: int) -> DeviceDescription:
         InputError: There is no such file, or it cannot be parsed.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such EDS or DCF file.")
+        raise InputError(f"{path}: no such EDS or DCF file.", code="PNT-BUSFILE-004")
     try:
         dictionary = canopen.import_od(str(path), node_id=node_id)
     except Exception as error:  # A parser of INI files raises what it likes.
         text = " ".join(str(error).split())
-        raise InputError(f"{path}: not an EDS or DCF file: {text}") from error
+        raise InputError(
+            f"{path}: not an EDS or DCF file: {text}", code="PNT-BUSFILE-005"
+        ) from error
     infos = []
     for entry in dictionary.values():
         parts = [entry] if isinstance(entry, ODVariable) else list(entry.values())
@@ -128,7 +130,7 @@ def read_device(path: Path, node_id: int) -> DeviceDescription:
                 continue
             infos.append(info)
     if not infos:
-        raise InputError(f"{path}: holds no objects.")
+        raise InputError(f"{path}: holds no objects.", code="PNT-BUSFILE-006")
     return DeviceDescription(str(path), infos)
 
 

@@ -113,11 +113,18 @@ class ArmBus:
             BusError: Nothing is latched, or the cause is still there; names it.
         """
         if self.phase != BusState.STOPPED:
-            raise BusError(f"nothing to acknowledge: the bus is {self.phase}.")
+            raise BusError(
+                f"nothing to acknowledge: the bus is {self.phase}.", code="PNT-BUS-001"
+            )
         if self._is_lost:
-            raise BusError(f"cannot acknowledge, the bus is still lost: {self.reason}")
+            raise BusError(
+                f"cannot acknowledge, the bus is still lost: {self.reason}",
+                code="PNT-BUS-002",
+            )
         if self.io.inputs is not None and not self.io.is_chain_closed:
-            raise BusError("cannot acknowledge: the e-stop chain is open.")
+            raise BusError(
+                "cannot acknowledge: the e-stop chain is open.", code="PNT-BUS-003"
+            )
         self.reason, self._stopped_at = "", 0.0
         self._follower.release()
         self._begin(
@@ -278,7 +285,7 @@ class ArmBus:
             for node in self.nodes
         )
         if not self.io.is_chain_closed:
-            raise BusError("e-stop: the chain is open.")
+            raise BusError("e-stop: the chain is open.", code="PNT-BUS-004")
         yield from run_concurrently([drive.enable() for drive in self.drives])
         for drive in self.drives:
             yield from drive.home()

@@ -178,14 +178,16 @@ class DriveClient(NodeClient):
             if abs(found - self.config.counts_per_turn) > 0.5:
                 raise BusError(
                     f"{self.name}: wrong unit: the encoder has {found:g} counts a turn "
-                    f"(608Fh), the bus file says {self.config.counts_per_turn:g}."
+                    f"(608Fh), the bus file says {self.config.counts_per_turn:g}.",
+                    code="PNT-BUS-005",
                 )
         if self.plan.device.find(0x6502):
             supported = yield from self.read(0x6502)
             if not supported >> (self.mode - 1) & 1:
                 raise BusError(
                     f"{self.name}: mode {self.mode.name} is not supported: 6502h is "
-                    f"{supported:X}h."
+                    f"{supported:X}h.",
+                    code="PNT-BUS-006",
                 )
 
     def enable(self) -> Script:
@@ -252,7 +254,10 @@ class DriveClient(NodeClient):
         for index, sub, value in values:
             info = self.plan.device.find(index, sub)
             if info is None and not (index == 0x607C and value == 0):
-                raise BusError(f"{self.name}: no {index:04X}h:{sub} for homing.")
+                raise BusError(
+                    f"{self.name}: no {index:04X}h:{sub} for homing.",
+                    code="PNT-BUS-007",
+                )
             if info is not None:
                 yield from self.sdo.transfer(index, sub, pack(info.data_type, value))
         self.is_homing = True
@@ -279,7 +284,9 @@ class DriveClient(NodeClient):
 
     def _has_homed(self) -> bool:
         if self.statusword & Status.MODE_13:
-            raise BusError(f"{self.name}: homing error (statusword bit 13).")
+            raise BusError(
+                f"{self.name}: homing error (statusword bit 13).", code="PNT-BUS-008"
+            )
         done = Status.MODE_12 | Status.TARGET_REACHED
         return self.statusword & done == done
 
@@ -288,7 +295,9 @@ class DriveClient(NodeClient):
         start = self.now
         while (yield from self.read(0x6061)) != mode:
             if self.now - start > self._timeouts.transition:
-                raise BusError(f"{self.name}: does not change to {mode.name}.")
+                raise BusError(
+                    f"{self.name}: does not change to {mode.name}.", code="PNT-BUS-009"
+                )
 
     def _leave(self, state: State | None) -> Script:
         """Waits until the drive is in another state, longer where the brake moves."""
@@ -304,7 +313,8 @@ class DriveClient(NodeClient):
             if self.now - start > timeout:
                 raise BusError(
                     f"{self.name}: {shown} for {timeout:g} s; statusword "
-                    f"{self.statusword:04X}h, {self.fault_text()}."
+                    f"{self.statusword:04X}h, {self.fault_text()}.",
+                    code="PNT-BUS-010",
                 )
             yield
 

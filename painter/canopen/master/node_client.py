@@ -136,7 +136,9 @@ class NodeClient:
         start = self.now
         while not condition():
             if self.now - start > timeout:
-                raise BusError(f"{self.name}: {failure} within {timeout:g} s.")
+                raise BusError(
+                    f"{self.name}: {failure} within {timeout:g} s.", code="PNT-BUS-011"
+                )
             yield
 
     def bring_up(self) -> Script:
@@ -191,7 +193,8 @@ class NodeClient:
         kind = yield from self.read(0x1000)
         if kind & 0xFFFF != self._profile:
             raise BusError(
-                f"{self.name}: 1000h is {kind:08X}h, not a CiA {self._profile} device."
+                f"{self.name}: 1000h is {kind:08X}h, not a CiA {self._profile} device.",
+                code="PNT-BUS-012",
             )
         for sub, field in enumerate(_IDENTITY, start=1):
             wanted = getattr(self._identity, field)
@@ -201,7 +204,8 @@ class NodeClient:
             if found != wanted:
                 raise BusError(
                     f"{self.name}: wrong device: {field} (1018h:{sub}) is {found:X}h, "
-                    f"the bus file says {wanted:X}h."
+                    f"the bus file says {wanted:X}h.",
+                    code="PNT-BUS-013",
                 )
 
     def _take_heartbeat(self, state: int) -> None:

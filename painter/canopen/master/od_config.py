@@ -79,7 +79,10 @@ class ConfigPlan:
         """
         info = self.device.find(index, sub)
         if info is None or info.access not in ("rw", "wo"):
-            raise InputError(f"{self.device.source}: no {index:04X}h:{sub} for {why}.")
+            raise InputError(
+                f"{self.device.source}: no {index:04X}h:{sub} for {why}.",
+                code="PNT-BUS-014",
+            )
         low, high = bounds(info.data_type)
         if info.low != info.high:
             low = max(low, int(info.low)) if isinstance(info.low, int) else low
@@ -87,7 +90,8 @@ class ConfigPlan:
         if not low <= value <= high:
             raise InputError(
                 f"{self.device.source}: {why} ({index:04X}h:{sub}) must be {low} to "
-                f"{high}, got {value}."
+                f"{high}, got {value}.",
+                code="PNT-BUS-015",
             )
         self.entries.append(Entry(index, sub, value, why, mask))
 
@@ -140,7 +144,7 @@ def plan_drive(
     """
     mode = choose_mode(device)
     if mode is None:
-        raise InputError(f"{device.source}: neither CSP nor IP.")
+        raise InputError(f"{device.source}: neither CSP nor IP.", code="PNT-BUS-016")
     plan, node = ConfigPlan(device), drive.node_id
     plan.need(0x6060, 0, mode, "mode of operation")
     milliseconds = round(bus.cycle * 1e3)
@@ -234,10 +238,13 @@ def write_and_verify(
         try:
             found = unpack(info.data_type, data)
         except ValueError as error:
-            raise BusError(f"{name}: {entry.index:04X}h:{entry.sub}: {error}") from None
+            raise BusError(
+                f"{name}: {entry.index:04X}h:{entry.sub}: {error}", code="PNT-BUS-017"
+            ) from None
         assert isinstance(found, int)
         if (found ^ entry.value) & entry.mask:
             raise BusError(
                 f"{name}: {entry.why} ({entry.index:04X}h:{entry.sub}) was written "
-                f"{entry.value} and reads {found}."
+                f"{entry.value} and reads {found}.",
+                code="PNT-BUS-018",
             )

@@ -291,7 +291,9 @@ class BusProcess:
             BusError: The bus process has ended; says why where it could.
         """
         if not self._process.is_alive():
-            raise BusError(f"the bus process has ended: {self._last_words()}")
+            raise BusError(
+                f"the bus process has ended: {self._last_words()}", code="PNT-BUS-019"
+            )
         found = self._mailbox.get()
         return None if found is None else found[1]
 
@@ -327,12 +329,14 @@ class BusProcess:
         # no command is longer: this never waits.
         _, ready, _ = select.select([], [self._commands], [], 0.0)
         if not ready:
-            raise BusError("the bus process does not take commands any more.")
+            raise BusError(
+                "the bus process does not take commands any more.", code="PNT-BUS-020"
+            )
         try:
             self._commands.send((word, argument))
         except (BrokenPipeError, OSError) as error:
             raise BusError(
-                f"the bus process has ended: {self._last_words()}"
+                f"the bus process has ended: {self._last_words()}", code="PNT-BUS-021"
             ) from error
 
     def _last_words(self) -> str:

@@ -7,9 +7,11 @@ and dropped: python-canopen takes a late one for success of the next write.
 Source: CiA 301 v4.2.0, 7.2.4.3.
 """
 
+import functools
 from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from typing import Any
 
 from painter.canopen.protocol.codes import abort_text
 from painter.canopen.protocol.frames import SDO_TO_SERVER, Frame
@@ -23,13 +25,18 @@ class SdoError(BusError):
     """A request was refused or not answered.
 
     Attributes:
-        code: SDO abort code.
+        abort_code: SDO abort code.
     """
 
-    def __init__(self, message: str, code: int) -> None:
+    def __init__(self, message: str, *, code: str, abort_code: int) -> None:
         """Creates it."""
-        super().__init__(message)
-        self.code = code
+        super().__init__(message, code=code)
+        self.abort_code = abort_code
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Lets the error cross to another process with both codes."""
+        make = functools.partial(type(self), code=self.code, abort_code=self.abort_code)
+        return make, self.args
 
 
 @dataclass
@@ -218,6 +225,7 @@ class SdoClient:
         request.error = SdoError(
             f"{self._name}: SDO {what} of {request.index:04X}h:{request.sub} failed: "
             f"{abort_text(code)} ({code:08X}h).",
-            code,
+            code="PNT-BUS-039",
+            abort_code=code,
         )
         request.is_done = True

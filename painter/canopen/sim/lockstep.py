@@ -99,7 +99,7 @@ class LockstepBus:
 
     def _alive(self) -> ArmBus:
         if self.master is None:
-            raise BusError("the bus process has ended: killed.")
+            raise BusError("the bus process has ended: killed.", code="PNT-BUS-022")
         return self.master
 
     def _note(self, time: float, q: FloatArray, v: FloatArray, trigger: float) -> None:

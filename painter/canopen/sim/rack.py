@@ -235,4 +235,4 @@ class WireTransport:
 
     def _check(self) -> None:
         if self.is_down:
-            raise TransportError("the CAN interface is down.")
+            raise TransportError("the CAN interface is down.", code="PNT-BUS-023")

@@ -49,7 +49,9 @@ class LocalHub:
             self._listener.bind(path)
         except OSError as error:
             self._listener.close()
-            raise TransportError(f"local {path}: {error.strerror}.") from error
+            raise TransportError(
+                f"local {path}: {error.strerror}.", code="PNT-BUS-024"
+            ) from error
         self._listener.listen()
         self._clients: list[socket.socket] = []
 

@@ -107,13 +107,17 @@ def read_lines(path: Path) -> Iterator[LogRecord | None]:
                 try:
                     yield parse_line(line.rstrip())
                 except ValueError as error:
-                    raise InputError(f"{path}: line {number}: {error}") from None
+                    raise InputError(
+                        f"{path}: line {number}: {error}", code="PNT-BUS-025"
+                    ) from None
     except FileNotFoundError:
-        raise InputError(f"{path}: no such log.") from None
+        raise InputError(f"{path}: no such log.", code="PNT-BUS-026") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: not a candump log: it is not text.") from None
+        raise InputError(
+            f"{path}: not a candump log: it is not text.", code="PNT-BUS-027"
+        ) from None
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}.") from error
+        raise InputError(f"{path}: {error.strerror}.", code="PNT-BUS-028") from error
 
 
 def read_log(path: Path) -> BusLog:
@@ -125,5 +129,5 @@ def read_log(path: Path) -> BusLog:
     found = list(read_lines(path))
     records = [record for record in found if record is not None]
     if not records:
-        raise InputError(f"{path}: holds no CANopen frames.")
+        raise InputError(f"{path}: holds no CANopen frames.", code="PNT-BUS-029")
     return BusLog(records, len(found) - len(records))

@@ -121,7 +121,9 @@ class FrameLogger:
         try:
             path.open("w").close()
         except OSError as error:
-            raise InputError(f"{path}: {error.strerror}.") from error
+            raise InputError(
+                f"{path}: {error.strerror}.", code="PNT-BUS-030"
+            ) from error
         context = multiprocessing.get_context("spawn")
         read, self.pipe = context.Pipe(duplex=False)
         with contextlib.suppress(OSError):  # A limit of the system's; 64 KiB will do.

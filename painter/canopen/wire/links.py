@@ -82,12 +82,14 @@ class PythonCanTransport:
             )
         except (can.CanError, OSError, ValueError, ImportError) as error:
             text = " ".join(str(error).split())
-            raise TransportError(f"{interface} {channel}: {text}") from error
+            raise TransportError(
+                f"{interface} {channel}: {text}", code="PNT-BUS-031"
+            ) from error
 
     def send(self, frame: Frame) -> None:
         """Sends a frame."""
         if self._bus is None:
-            raise TransportError("the CAN interface is closed.")
+            raise TransportError("the CAN interface is closed.", code="PNT-BUS-032")
         if self._echoes:
             self._own = [*self._own[-255:], (frame.cob_id, frame.data)]
         message = can.Message(
@@ -96,12 +98,14 @@ class PythonCanTransport:
         try:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
-            raise TransportError(f"sending failed: {error}") from error
+            raise TransportError(
+                f"sending failed: {error}", code="PNT-BUS-033"
+            ) from error
 
     def receive(self, timeout: float) -> list[Frame]:
         """Returns frames that came; waits up to `timeout` s for the first one."""
         if self._bus is None:
-            raise TransportError("the CAN interface is closed.")
+            raise TransportError("the CAN interface is closed.", code="PNT-BUS-034")
         frames: list[Frame] = []
         try:
             message = self._bus.recv(timeout)
@@ -111,7 +115,9 @@ class PythonCanTransport:
             if message is not None:
                 self._take(message, frames)
         except (can.CanError, OSError) as error:
-            raise TransportError(f"receiving failed: {error}") from error
+            raise TransportError(
+                f"receiving failed: {error}", code="PNT-BUS-035"
+            ) from error
         return frames
 
     def close(self) -> None:
@@ -168,7 +174,9 @@ class LocalTransport:
             link.connect(self._path)
         except OSError as error:
             link.close()
-            raise TransportError(f"local {self._path}: {error.strerror}.") from error
+            raise TransportError(
+                f"local {self._path}: {error.strerror}.", code="PNT-BUS-036"
+            ) from error
         self._socket = link
 
     def send(self, frame: Frame) -> None:
@@ -197,11 +205,15 @@ class LocalTransport:
 
     def _do(self, act: Callable[[socket.socket], T]) -> T:
         if self._socket is None:
-            raise TransportError(f"local {self._path}: not connected.")
+            raise TransportError(
+                f"local {self._path}: not connected.", code="PNT-BUS-037"
+            )
         try:
             return act(self._socket)
         except OSError as error:
-            raise TransportError(f"local {self._path}: {error.strerror}.") from error
+            raise TransportError(
+                f"local {self._path}: {error.strerror}.", code="PNT-BUS-038"
+            ) from error
 
 
 def _receive(link: socket.socket, *, wait: float) -> bytes | None:

@@ -52,7 +52,8 @@ def propose_distance(
     if best[0] <= 0.0:
         raise ReachError(
             f"placement: nothing of the tile is reached with the wall "
-            f"{distances[0]:.2f} to {distances[-1]:.2f} m from the base axis."
+            f"{distances[0]:.2f} to {distances[-1]:.2f} m from the base axis.",
+            code="PNT-REACH-001",
         )
     # The longest run of equals leaves most room for an error of the base.
     good = np.array([share == best for share in shares])

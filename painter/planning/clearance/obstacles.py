@@ -235,6 +235,7 @@ class ClearSpace:
                 raise CollisionError(
                     f"{what}: {self.worst_pair(q[first])} at {time[first]:.2f} s; "
                     f"clearance is {1e3 * self.clearance:.0f} mm, "
-                    f"{1e3 * self._floor_clearance:.0f} mm from floor and frame."
+                    f"{1e3 * self._floor_clearance:.0f} mm from floor and frame.",
+                    code="PNT-MOTION-001",
                 )
             begin, count = begin + count, 2 * count

@@ -109,7 +109,8 @@ def require_reach(
     if needed[worst] > longest:
         raise ReachError(
             f"{share}; {place}, needs {needed[worst]:.2f} m from shoulder to wrist, "
-            f"the arm has {longest:.2f} m."
+            f"the arm has {longest:.2f} m.",
+            code="PNT-REACH-002",
         )
     worst = int(np.flatnonzero(bad)[0])
     x, y, z = p_TGs[worst]
@@ -117,13 +118,15 @@ def require_reach(
     if np.isnan(q[worst]).any():
         raise ReachError(
             f"{share}; {place}, needs {needed[worst]:.2f} m from shoulder to wrist, "
-            f"the arm cannot fold below {abs(arm.upper_arm - arm.forearm):.2f} m."
+            f"the arm cannot fold below {abs(arm.upper_arm - arm.forearm):.2f} m.",
+            code="PNT-REACH-003",
         )
     excess = np.maximum(limits.q_min - q[worst], q[worst] - limits.q_max)
     joint = int(np.argmax(excess))
     raise ReachError(
         f"{share}; {place}, needs {_JOINTS[joint]} at {q[worst, joint]:.2f} rad, its "
-        f"range is {limits.q_min[joint]:.2f} to {limits.q_max[joint]:.2f} rad."
+        f"range is {limits.q_min[joint]:.2f} to {limits.q_max[joint]:.2f} rad.",
+        code="PNT-REACH-004",
     )
 
 

@@ -280,7 +280,8 @@ class TransitionPlanner(FrozenValue):
         blend = fastest_joint_blend(before, after, self.limits)
         if blend is None:
             raise failure or ReachError(
-                f"{what} leaves the arm's reach or its joint limits."
+                f"{what} leaves the arm's reach or its joint limits.",
+                code="PNT-MOTION-002",
             )
         if failure is None:
             self.require_clear(blend, what=what)

@@ -104,7 +104,8 @@ def verify_strokes(
     if len(motion.spray_on) != len(program.strokes):
         raise MotionLimitError(
             f"program: the gun opens {len(motion.spray_on)} times for "
-            f"{len(program.strokes)} strokes."
+            f"{len(program.strokes)} strokes.",
+            code="PNT-MOTION-003",
         )
     opened = motion.spray_on + valve_delay
     times = [_dense(float(opens), float(closes)) for opens, closes in opened]
@@ -229,5 +230,6 @@ def _require_within(
     joint = f" of {_JOINTS[worst[1]]}" if size.shape[1:] == (5,) else ""
     raise MotionLimitError(
         f"{what}{joint} is {size[worst]:.4g} {unit} at {time[worst[0]]:.3f} s, "
-        f"allowed is {bounds[worst]:.4g} {unit}."
+        f"allowed is {bounds[worst]:.4g} {unit}.",
+        code="PNT-MOTION-004",
     )

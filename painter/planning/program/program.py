@@ -214,7 +214,8 @@ def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke,
     if not 1.0 <= from_stroke < len(strokes) + 1.0:
         raise InputError(
             f"from_stroke must be 1 to {len(strokes)}, the number of strokes, got "
-            f"{from_stroke!r}."
+            f"{from_stroke!r}.",
+            code="PNT-PROGRAM-001",
         )
     first = int(from_stroke)
     return (

@@ -108,11 +108,17 @@ def load_program(folder: Path) -> PaintProgram:
             skipped=skipped,
         )
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}.") from error
+        raise InputError(
+            f"{path}: {error.strerror}.", code="PNT-PROGRAM-002"
+        ) from error
     except KeyError as error:
-        raise InputError(f"{path}: has no {error.args[0]!r}.") from error
+        raise InputError(
+            f"{path}: has no {error.args[0]!r}.", code="PNT-PROGRAM-003"
+        ) from error
     except (ValueError, TypeError) as error:
-        raise InputError(f"{path}: is not a paint program ({error}).") from error
+        raise InputError(
+            f"{path}: is not a paint program ({error}).", code="PNT-PROGRAM-004"
+        ) from error
 
 
 def _load_motion(path: Path, spray_on: FloatArray, flow: FloatArray) -> Motion:
@@ -126,9 +132,11 @@ def _load_motion(path: Path, spray_on: FloatArray, flow: FloatArray) -> Motion:
                 flow=flow,
             )
     except KeyError as error:
-        raise InputError(f"{path}: {error.args[0]}") from error
+        raise InputError(f"{path}: {error.args[0]}", code="PNT-PROGRAM-005") from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path}: not a readable .npz file ({error}).") from error
+        raise InputError(
+            f"{path}: not a readable .npz file ({error}).", code="PNT-PROGRAM-006"
+        ) from error
 
 
 def _stroke_fields(stroke: Stroke) -> dict[str, Any]:

@@ -114,7 +114,9 @@ def _linked(
             passes.append(len(path) - 1)
             sprayed.append(fit.stroke)
     if strokes and not sprayed:
-        raise CollisionError(f"no stroke can be come to: {skipped[0].reason}")
+        raise CollisionError(
+            f"no stroke can be come to: {skipped[0].reason}", code="PNT-PROGRAM-007"
+        )
     return [*path, *home], tuple(sprayed), passes, skipped
 
 

@@ -132,7 +132,7 @@ class FreeMotionPlanner(FrozenValue):
     def _linker(
         self, q0: FloatArray, X_WT: RigidTransform, keepouts: Sequence[float]
     ) -> TransitionPlanner:
-        """Returns a planner with the largest keep-out that the arm does not stand in."""
+        """Returns a planner with the largest keep-out that the arm is outside of."""
         motion = self.motion
         for keepout in keepouts:
             space = ClearSpace(
@@ -150,7 +150,8 @@ class FreeMotionPlanner(FrozenValue):
                     q_home=np.deg2rad(motion.home_deg),
                 )
         raise CollisionError(
-            f"the arm stands where it may not: {space.worst_pair(q0)}."
+            f"the arm stands where it may not: {space.worst_pair(q0)}.",
+            code="PNT-SCAN-001",
         )
 
     def _verified(

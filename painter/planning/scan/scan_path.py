@@ -128,7 +128,8 @@ def look_poses(
         raise ReachError(
             f"look: no clear pose with the camera {scan.look_distance:.2f} m before "
             f"the wall within {_LOOK_SPREAD} m of T ({centre_T[0]:.2f}, "
-            f"{centre_T[1]:.2f}) m."
+            f"{centre_T[1]:.2f}) m.",
+            code="PNT-SCAN-002",
         )
     return transitions.gun.inverse_kinematics(p_TGs[good])
 

@@ -45,7 +45,7 @@ def film_and_truth(run: RunFolder) -> tuple[Film, Truth]:
     """Reads a run's film and where it lies; raises InputError if one is missing."""
     film, truth = run.film(), run.truth()
     if film is None:
-        raise InputError(f"{run.path / FILM}: no such file.")
+        raise InputError(f"{run.path / FILM}: no such file.", code="PNT-RUN-001")
     if truth is None:
-        raise InputError(f"{run.path / TRUTH}: no such file.")
+        raise InputError(f"{run.path / TRUTH}: no such file.", code="PNT-RUN-002")
     return film, truth

@@ -60,7 +60,8 @@ def load_film(path: Path) -> Film:
     for name in data.keys() - set(numbers):
         if data[name].shape != shape or len(shape) != 2:
             raise InputError(
-                f"{path}: {name} has shape {data[name].shape}, not {shape}."
+                f"{path}: {name} has shape {data[name].shape}, not {shape}.",
+                code="PNT-RUN-008",
             )
     for name in data.keys() & {"thickness", "before"}:
         data[name] = data[name].astype(float)
@@ -112,12 +113,15 @@ def load_map(path: Path) -> np.ndarray:
     head, mark, body = path.read_bytes().partition(b"end_header\n")
     words = head.decode("ascii", "replace").split()
     if not mark or "vertex" not in words:
-        raise InputError(f"{path}: not a map of Painter's (no PLY header).")
+        raise InputError(
+            f"{path}: not a map of Painter's (no PLY header).", code="PNT-RUN-009"
+        )
     count = int(words[words.index("vertex") + 1])
     if len(body) != count * _PLY_POINT.itemsize:
         raise InputError(
             f"{path}: {len(body)} bytes of points, expected "
-            f"{count * _PLY_POINT.itemsize} for {count} points."
+            f"{count * _PLY_POINT.itemsize} for {count} points.",
+            code="PNT-RUN-010",
         )
     points = np.frombuffer(body, dtype=_PLY_POINT)
     return np.stack([points[name].astype(float) for name in "xyz"])
@@ -133,9 +137,11 @@ def _load(path: Path, names: Sequence[str], optional: Sequence[str] = ()) -> dic
             present = [name for name in optional if name in file]
             return {name: file[name] for name in (*names, *present)}
     except KeyError as error:
-        raise InputError(f"{path}: {error.args[0]}") from error
+        raise InputError(f"{path}: {error.args[0]}", code="PNT-RUN-011") from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path}: not a readable .npz file ({error}).") from error
+        raise InputError(
+            f"{path}: not a readable .npz file ({error}).", code="PNT-RUN-012"
+        ) from error
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -89,12 +89,15 @@ class RunFolder:
             InputError: The folder is a file, holds something else or cannot be written.
         """
         if path.exists() and not path.is_dir():
-            raise InputError(f"{path}: there is a file of that name.")
+            raise InputError(
+                f"{path}: there is a file of that name.", code="PNT-RUN-013"
+            )
         try:
             path.mkdir(parents=True, exist_ok=True)
             if any(path.iterdir()) and not _is_run(path):
                 raise InputError(
-                    f"{path}: not empty and not a run folder; nothing was replaced."
+                    f"{path}: not empty and not a run folder; nothing was replaced.",
+                    code="PNT-RUN-014",
                 )
             (path / INCOMPLETE).write_text("The run has begun and not ended.\n")
             for name in FILES:
@@ -102,7 +105,9 @@ class RunFolder:
             (path / EVENTS).touch()
             (path / SCENARIO).write_text(scenario_yaml)
         except OSError as error:
-            raise InputError(f"{path}: {error.strerror}.") from error
+            raise InputError(
+                f"{path}: {error.strerror}.", code="PNT-RUN-015"
+            ) from error
         return cls(path)
 
     @classmethod
@@ -113,9 +118,12 @@ class RunFolder:
             InputError: There is no such folder, or no run has left it.
         """
         if not path.is_dir():
-            raise InputError(f"{path}: no such folder.")
+            raise InputError(f"{path}: no such folder.", code="PNT-RUN-016")
         if not _is_run(path):
-            raise InputError(f"{path}: not a run folder (no {SCENARIO} and {EVENTS}).")
+            raise InputError(
+                f"{path}: not a run folder (no {SCENARIO} and {EVENTS}).",
+                code="PNT-RUN-017",
+            )
         return cls(path)
 
     @property
@@ -162,7 +170,8 @@ class RunFolder:
                 if number == len(lines) and not self.is_complete:
                     break
                 raise InputError(
-                    f"{path}:{number}: not a JSON object with a time."
+                    f"{path}:{number}: not a JSON object with a time.",
+                    code="PNT-RUN-018",
                 ) from error
             events.append(event)
         return events
@@ -178,7 +187,7 @@ class RunFolder:
             ((_, fields),) = yaml.safe_load(_read_text(path)).items()
             return dict(fields)
         except (yaml.YAMLError, AttributeError, TypeError, ValueError) as error:
-            raise InputError(f"{path}: not a scenario.") from error
+            raise InputError(f"{path}: not a scenario.", code="PNT-RUN-019") from error
 
     def save_map(self, surface_map: SurfaceMap) -> None:
         """Writes map.ply."""
@@ -253,9 +262,11 @@ class RunFolder:
         try:
             return read(path)
         except (PainterError, PerceptionError) as error:
-            raise InputError(str(error)) from error
+            raise InputError(str(error), code="PNT-RUN-020") from error
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{path}: cannot be read ({error}).") from error
+            raise InputError(
+                f"{path}: cannot be read ({error}).", code="PNT-RUN-021"
+            ) from error
 
 
 def rounded(value: Any) -> Any:
@@ -275,7 +286,9 @@ def _read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error}).") from error
+        raise InputError(
+            f"{path}: cannot be read ({error}).", code="PNT-RUN-022"
+        ) from error
 
 
 def _write_text(path: Path, text: str) -> None:

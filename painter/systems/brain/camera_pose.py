@@ -136,7 +136,8 @@ class CameraPose(LeafSystem):
             name = self.GetSystemPathname()
             raise ImageTimeError(
                 f"{name}: the picture is {now - time:.3f} s old; joint positions "
-                f"reach back {now - history.time[0]:.3f} s."
+                f"reach back {now - history.time[0]:.3f} s.",
+                code="PNT-CYCLE-003",
             )
         R_WC, p_WC = self._kinematics.camera_poses(history.at(time)[np.newaxis])
         X_WC = RigidTransform(RotationMatrix(R_WC[0]), p_WC[0])

@@ -83,7 +83,8 @@ class MotionPlanner(Stage):
         if goal not in (*GOALS, MORE_LOOKS):
             raise PainterError(
                 f"{self.GetSystemPathname()}: goal must be one of "
-                f"{', '.join((*GOALS, MORE_LOOKS))}, got {goal!r}."
+                f"{', '.join((*GOALS, MORE_LOOKS))}, got {goal!r}.",
+                code="PNT-CYCLE-004",
             )
         wall = EvalAs(self._wall_port, context, StageResult).value
         tile = self._planner.tile

@@ -207,7 +207,8 @@ class PathFollower(LeafSystem):
             raise MotionLimitError(
                 f"{name}: a motion starts {jump.max():.4f} rad from "
                 f"where the arm is (joint {jump.argmax() + 1}, speed "
-                f"{np.abs(q_v[NQ:]).max():.4f} rad/s); bound {START_TOLERANCE} rad."
+                f"{np.abs(q_v[NQ:]).max():.4f} rad/s); bound {START_TOLERANCE} rad.",
+                code="PNT-CYCLE-005",
             )
 
     def _CalcDesiredState(self, context: Context, output: BasicVector) -> None:

@@ -78,13 +78,15 @@ class SprayPathPlanner(Stage):
         if not isinstance(segmentation, WallSegmentation):
             raise PainterError(
                 f"{self.GetSystemPathname()}:segmentation carries no segmentation: "
-                f"none was made yet."
+                f"none was made yet.",
+                code="PNT-CYCLE-006",
             )
         shape = grid_shape(self._tile, segmentation.cell)
         if segmentation.wall_mask.shape != shape:
             raise PainterError(
                 f"{self.GetSystemPathname()}:segmentation has "
-                f"{segmentation.wall_mask.shape} cells, the tile {shape}."
+                f"{segmentation.wall_mask.shape} cells, the tile {shape}.",
+                code="PNT-CYCLE-007",
             )
         q0 = np.array(self._state_port.Eval(context)[:5])
         strokes = self._strokes

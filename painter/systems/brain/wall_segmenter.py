@@ -74,7 +74,8 @@ class WallSegmenter(Stage):
         wall = EvalAs(self._wall_port, context, StageResult).value
         if not isinstance(wall, Wall):
             raise PainterError(
-                f"{self.GetSystemPathname()}:wall carries no wall: none was found yet."
+                f"{self.GetSystemPathname()}:wall carries no wall: none was found yet.",
+                code="PNT-CYCLE-008",
             )
         return segment_wall(
             surface_map.p_WQs,

@@ -86,7 +86,7 @@ class CanopenArm(LeafSystem):
         super().__init__()
         report = bus.report()
         if report is None or report.feedback.phase != BusState.ENABLED:
-            raise BusError("the drives are not enabled.")
+            raise BusError("the drives are not enabled.", code="PNT-CYCLE-009")
         self._bus = bus
         self._clock = clock
         self._gun_off = gun_off

@@ -164,7 +164,10 @@ class PaintFilm(LeafSystem):
         trigger = float(self._trigger_port.Eval(context)[0])
         if not 0.0 <= trigger <= 1.0:
             name = self.GetSystemPathname()
-            raise PainterError(f"{name}: trigger must be 0 to 1, got {trigger!r}.")
+            raise PainterError(
+                f"{name}: trigger must be 0 to 1, got {trigger!r}.",
+                code="PNT-CYCLE-011",
+            )
         X_SG = self._X_SW @ EvalAs(self._pose_port, context, RigidTransform)
         index = int(self._film_index)
         film: FilmState = context.get_abstract_state(index).get_value()

@@ -104,7 +104,8 @@ def calibrate_on_board(
     if len(views) < FEWEST:
         raise CalibrationError(
             f"{len(views)} pictures show the board and have a pose of the arm, "
-            f"{FEWEST} are needed."
+            f"{FEWEST} are needed.",
+            code="PNT-CALIBRATE-001",
         )
     p_BQs = np.asarray(config.board().getChessboardCorners(), dtype=float)
     X_WB = _first_guess(views[0], p_BQs, intrinsics)

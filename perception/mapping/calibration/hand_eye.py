@@ -95,7 +95,8 @@ def calibrate_on_wall(
     usable = [frame for frame in frames if frame.X_WC is not None]
     if len(usable) < FEWEST:
         raise CalibrationError(
-            f"{len(usable)} pictures have a pose of the arm, {FEWEST} are needed."
+            f"{len(usable)} pictures have a pose of the arm, {FEWEST} are needed.",
+            code="PNT-CALIBRATE-002",
         )
     keyframes = [
         make_keyframe(
@@ -105,7 +106,8 @@ def calibrate_on_wall(
     ]
     if sum(bool(keyframe.planes) for keyframe in keyframes) < FEWEST:
         raise CalibrationError(
-            f"fewer than {FEWEST} pictures show a plane: look at a wall."
+            f"fewer than {FEWEST} pictures show a plane: look at a wall.",
+            code="PNT-CALIBRATE-003",
         )
     mount = RigidTransform()
     for _ in range(_ROUNDS):

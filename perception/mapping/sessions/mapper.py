@@ -254,7 +254,8 @@ class Mapper:
         if abs(ratio - 1.0) > _SCALE:
             raise NoMapError(
                 f"the pictures move {ratio:.3f} times as far as the arm, 1 +- {_SCALE} "
-                "is allowed: the camera's focal length or depth unit is wrong."
+                "is allowed: the camera's focal length or depth unit is wrong.",
+                code="PNT-MAP-001",
             )
 
     def _no_map(self) -> NoMapError:
@@ -263,7 +264,10 @@ class Mapper:
             return NoMapError(
                 f"{lost} of {total} frames have no pose and could not be followed: "
                 f"{self._best_inliers} corners agree, {self.config.min_inliers} are "
-                "needed. The wall shows too little texture; give the arm's poses."
+                "needed. The wall shows too little texture; give the arm's poses.",
+                code="PNT-MAP-002",
             )
         counts = ", ".join(f"{name}: {n}" for name, n in self.outcomes.items())
-        return NoMapError(f"no frame can be used ({counts or 'there is none'}).")
+        return NoMapError(
+            f"no frame can be used ({counts or 'there is none'}).", code="PNT-MAP-003"
+        )

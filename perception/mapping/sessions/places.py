@@ -127,7 +127,8 @@ def localise(known: KeyframeGraph, session: KeyframeGraph) -> Localisation:
         raise NotLocalisedError(
             f"the map shows where {len(guesses)} of {len(session.keyframes)} keyframes "
             f"were taken, and {most} of them agree; {_AGREEING} and {_SHARE:.0%} are "
-            "needed. The session stays apart."
+            "needed. The session stays apart.",
+            code="PNT-MAP-004",
         )
     best = guesses[support.index(most)][0]
     return Localisation(X_MN=best, agreeing=most, found=len(guesses))

@@ -54,7 +54,9 @@ class MapStore:
             self._db.execute("PRAGMA synchronous=NORMAL")
             self._db.executescript(SCHEMA)
         except sqlite3.Error as error:
-            raise CloudReadError(f"{path}: no map file: {error}.") from error
+            raise CloudReadError(
+                f"{path}: no map file: {error}.", code="PNT-MAP-005"
+            ) from error
 
     def __enter__(self) -> Self:
         return self
@@ -74,7 +76,10 @@ class MapStore:
         """
         known = self.intrinsics
         if known is not None and known != intrinsics:
-            raise CloudReadError(f"{self.path}: was made with another camera, {known}.")
+            raise CloudReadError(
+                f"{self.path}: was made with another camera, {known}.",
+                code="PNT-MAP-006",
+            )
         with self._db:
             for key, value in (("camera", intrinsics), ("config", config)):
                 self._db.execute(
@@ -232,5 +237,7 @@ def _png(image: npt.NDArray[Any]) -> bytes:
 def _picture(data: bytes, mode: int) -> npt.NDArray[Any]:
     image = cv2.imdecode(np.frombuffer(data, np.uint8), mode)
     if image is None:
-        raise CloudReadError("a picture in the map file is damaged.")
+        raise CloudReadError(
+            "a picture in the map file is damaged.", code="PNT-MAP-007"
+        )
     return np.asarray(image)

@@ -312,10 +312,10 @@ class NoWay:
     def to_rest(self, start):
         self.asked -= 1
         if self.asked:
-            raise CollisionError("no way back")
+            raise CollisionError("no way back", code="PNT-TEST-001")
 
     def from_rest(self, q, end):
-        raise CollisionError("no way there")
+        raise CollisionError("no way there", code="PNT-TEST-001")
 
 
 @pytest.mark.parametrize("length", [0.03, 0.04, 0.05, 0.07, 0.10, 0.12])

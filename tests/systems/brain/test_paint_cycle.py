@@ -262,7 +262,9 @@ def test_a_word_out_of_place_is_logged_as_refused():
 
 
 def test_failed_stage_ends_in_fault_with_its_cause():
-    rig = Rig(spray_path_planner=ReachError("row 3 is out of reach"))
+    rig = Rig(
+        spray_path_planner=ReachError("row 3 is out of reach", code="PNT-TEST-001")
+    )
     rig.advance_to_end()
     assert rig.phases == [*ALL[:5], "FAULT"]
     assert rig.status.cause == "spray_path_planner: ReachError: row 3 is out of reach"
