@@ -258,7 +258,12 @@ ROOMS: dict[str, set[str]] = {
         "painter.run.pictures",
         "perception",
     },
-    "painter.run": set(),
+    "painter.run": {
+        "painter.errors",
+        "painter.planning",
+        "painter.run.folder",
+        "perception.values",
+    },
     "painter.cycle": {
         "painter.camera",
         "painter.canopen",
