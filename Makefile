@@ -19,7 +19,7 @@ LONG_BENCHES := $(addprefix findings.,edge_bound edges fine_steps hil low_plates
   map_recordings map_sessions masks masks_pcl misplaced scanned_film)
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: help setup browser demo test test-all test-socketcan lint format bench bench-all \
+.PHONY: help setup browser demo test coverage test-all test-socketcan lint format bench bench-all \
   notebooks clean
 
 help: ## List the targets
@@ -86,6 +86,10 @@ demo: setup ## Simulate one whole paint cycle and say where its report is
 
 test: setup ## Run the fast tests
 	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+coverage: setup ## Run the fast tests, and print their coverage by room
+	@$(BIN)/python -m pytest $(PYTEST_ARGS) --cov --cov-report=json:runs/coverage.json
+	$(BIN)/python -m benchmarks.support.coverage_by_room runs/coverage.json
 
 test-all: setup ## Run all tests but those that need hardware
 	@$(BIN)/python -m pytest -m 'not hardware' $(PYTEST_ARGS)
