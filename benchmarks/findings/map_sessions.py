@@ -1,4 +1,4 @@
-"""The map accumulator on rendered walls and recordings, row by row of issue 6.
+"""The map accumulator on rendered walls and recordings, row by row.
 
 `python -m benchmarks.findings.map_sessions [ROW ...] [--rate HZ] [--scans N] [--seed
 N]`; rows: textured, textured-no-arm, painted, window, blank, blank-no-arm, wrong-links,

@@ -1,8 +1,8 @@
-"""Paint cycles of a robot that stands wrong and whose camera is mounted wrong.
+"""Paint cycles with a misplaced base and a misaligned camera mount.
 
 `python -m benchmarks.findings.misplaced --out runs/misplaced` paints all named scenes
 with the base 2 cm and 2 deg from where the job has it and the camera 3 mm and 0.3 deg
-from its modelled mount, both at once, and holds the figures against the first issue's.
+from its modelled mount, both at once, and compares them with the README's bounds.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Whole paint cycles by scene, against the figures that issue 2 asks for.
+"""Whole paint cycles by scene, against the bounds of the README.
 
 `cubes` runs with `make test`, the others with `make test-all`.
 """

@@ -166,7 +166,7 @@ def test_nothing_to_paint_means_no_strokes():
         # 97.0 % at 3.0 % (blank), 89.9 % at 6.3 % (window and box).
         ((), 0.969, 0.030),
         (((0.5, 0.6, 1.0, 1.2), (1.6, 0.2, 0.2, 0.2)), 0.90, 0.063),
-        # The bounds with something in hand.
+        # Bounds of the README's table, with a margin.
         (
             (
                 (0.25, 0.25, 0.1, 0.1),
