@@ -62,10 +62,10 @@ class Loop:
 
     def bring_up(self) -> "Loop":
         self.bus.start()
-        while self.bus.report().feedback.phase == BusState.STARTING:
+        while self.bus.report().feedback.bus_state == BusState.STARTING:
             self.bus.wait_until(self.bus.now() + 0.05)
         report = self.bus.report().feedback
-        assert report.phase == BusState.ENABLED, report.reason
+        assert report.bus_state == BusState.ENABLED, report.reason
         return self
 
     def connection(self, **changes) -> RobotConnection:

@@ -69,7 +69,7 @@ def wait_only() -> None:
         for _ in range(round(0.5 * SECONDS / PERIOD)):
             time.sleep(ticker.remaining())
             ticker.tick()
-            ticker.meet()
+            ticker.wait_until_due()
     late = ticker.lateness()
     print(
         f"{'bare loop':15} {kind:6}",
@@ -154,9 +154,9 @@ def stream(bus: BusConfig, log: Path) -> Report:
     with BusProcess(bus, log=log) as process:
         process.start()
         while (report := process.report()) is None or (
-            report.feedback.phase != BusState.ENABLED
+            report.feedback.bus_state != BusState.ENABLED
         ):
-            if report is not None and report.feedback.phase == BusState.STOPPED:
+            if report is not None and report.feedback.bus_state == BusState.STOPPED:
                 raise SystemExit(f"no bring-up: {report.feedback.reason}")
             time.sleep(0.01)
         q0, start = report.feedback.q, time.monotonic()
@@ -172,7 +172,7 @@ def stream(bus: BusConfig, log: Path) -> Report:
             time.sleep(0.02)
         report = process.report()
         assert report is not None
-        if report.feedback.phase != BusState.ENABLED:
+        if report.feedback.bus_state != BusState.ENABLED:
             print(f"  stopped: {report.feedback.reason}")
         return report
 

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from painter.camera.frame_link import FrameLink
+from painter.camera.frame_socket import FrameClient
 from painter.camera.reader import CameraReader, camera_opener
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.bus_file import load_bus
@@ -279,7 +279,7 @@ def _camera(job: Scenario, path: str | None, clock: TimeBase) -> CameraReader:
     config, stereo = job.wall_camera.driver, job.wall_camera.stereo
     source = None
     if path is not None:
-        source = FrameLink(path, latency=PICTURE_LATENCY, clock=clock)
+        source = FrameClient(path, latency=PICTURE_LATENCY, clock=clock)
         # Pictures come as seldom as the scenario's rate says, and may be rendered late.
         config = dataclasses.replace(
             config, latency=PICTURE_LATENCY, max_age=1.0, silence=3.0

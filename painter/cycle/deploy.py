@@ -188,7 +188,7 @@ def _Corrected(
     except BusError:
         feedback = None
     if feedback is not None:
-        if feedback.phase == BusState.ENABLED:
+        if feedback.bus_state == BusState.ENABLED:
             return status
         stopped_at = feedback.stopped_at
     stop = connection.clock.diagram_time(stopped_at)

@@ -123,11 +123,11 @@ def _check_drives(bus: Bus) -> Check:
             if report is None:
                 continue
             feedback = report.feedback
-            has_begun = has_begun or feedback.phase != BusState.DOWN
-            if feedback.phase == BusState.ENABLED:
+            has_begun = has_begun or feedback.bus_state != BusState.DOWN
+            if feedback.bus_state == BusState.ENABLED:
                 axes = ", ".join(axis.name for axis in feedback.axes)
                 return Check("drives", True, f"configured, read back, enabled: {axes}")
-            if feedback.phase == BusState.STOPPED:
+            if feedback.bus_state == BusState.STOPPED:
                 return Check("drives", False, feedback.reason)
     except BusError as error:
         return Check("drives", False, str(error))

@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-from painter.camera.frame_link import FrameServer
+from painter.camera.frame_socket import FrameServer
 from painter.canopen.process.realtime import set_niceness
 from painter.canopen.process.sample_ring import SampleRing
 from painter.config import Scenario, dump_scenario, load_scenario

@@ -156,7 +156,7 @@ def true_stroke_number(witness, remainder, moment):
 def acknowledge(loop):
     """Acknowledges the stop; returns what the bring-up came to."""
     loop.bus.acknowledge()
-    while (report := loop.bus.report().feedback).phase == BusState.STARTING:
+    while (report := loop.bus.report().feedback).bus_state == BusState.STARTING:
         loop.bus.wait_until(loop.bus.now() + 0.05)
     return report
 
@@ -166,9 +166,9 @@ def go_on(loop, log):
     loop.rack.clear()
     loop.unplugged = False
     loop.bus.wait_until(loop.bus.now() + 0.5)
-    assert loop.bus.report().feedback.phase == BusState.STOPPED
+    assert loop.bus.report().feedback.bus_state == BusState.STOPPED
     report = acknowledge(loop)
-    assert report.phase == BusState.ENABLED, report.reason
+    assert report.bus_state == BusState.ENABLED, report.reason
     scenario, remainder = job()
     rest = strokes_from(remainder.strokes, log.status.next_stroke)
     assert len(rest) == 2
@@ -215,7 +215,7 @@ def test_the_interface_is_down_for_a_moment_while_painting():
         loop.rack.inject(Fault.INTERFACE_DOWN)
         up = loop.rack.now + 0.3
         loop.observers.append(
-            lambda loop: vars(loop.rack.link).update(is_down=loop.rack.now < up)
+            lambda loop: vars(loop.rack.transport).update(is_down=loop.rack.now < up)
         )
 
     loop, witness, log = paint(blink)
@@ -247,7 +247,7 @@ def test_a_drive_that_is_another_after_a_reset_while_painting(fault, cause):
     assert "elbow_pitch: unexpected boot-up" in log.status.cause
     before = witness.q[-1]
     report = acknowledge(loop)
-    assert report.phase == BusState.STOPPED
+    assert report.bus_state == BusState.STOPPED
     assert "elbow_pitch" in report.reason
     assert cause in report.reason
     assert not witness.was_open

@@ -17,7 +17,7 @@ from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.sim.rack import Rack
 from painter.canopen.sim.wire import Wire
-from painter.canopen.wire.links import PythonCanTransport
+from painter.canopen.wire.transports import PythonCanTransport
 from painter.resources import models_path
 
 CHANNEL = os.environ.get("PAINTER_CAN")
@@ -41,17 +41,17 @@ def on_the_interface(monkeypatch):
     def deliver(wire, frame, sender, end):
         sockets = wire.sockets
         sockets[sender].send(frame)
-        for port, receive in enumerate(wire._receivers):
+        for port, receive in enumerate(wire.receivers):
             if port != sender:
                 found = sockets[port].receive(_DELIVERY_TIME)
                 assert found == [frame]
                 receive(found[0], end)
 
     monkeypatch.setattr(Wire, "attach", attach_socket)
-    monkeypatch.setattr(Wire, "_deliver", deliver)
+    monkeypatch.setattr(Wire, "deliver", deliver)
     yield
-    for link in opened:
-        link.close()
+    for transport in opened:
+        transport.close()
 
 
 class Lab:
@@ -60,7 +60,7 @@ class Lab:
     def __init__(self, bus: BusConfig | None = None) -> None:
         self.bus = bus or load_bus(models_path("bus", "painter.bus.yaml"))
         self.rack = Rack(self.bus)
-        self.master = ArmBus(self.bus, self.rack.link)
+        self.master = ArmBus(self.bus, self.rack.transport)
         self.cycles = 0
         self.path: Callable[[float], tuple[np.ndarray, np.ndarray]] | None = None
         self.trigger = 0.0
@@ -94,8 +94,8 @@ class Lab:
 
     def bring_up(self) -> "Lab":
         self.master.start()
-        self.until(lambda: self.master.phase != BusState.STARTING)
-        assert self.master.phase == BusState.ENABLED, self.master.reason
+        self.until(lambda: self.master.state != BusState.STARTING)
+        assert self.master.state == BusState.ENABLED, self.master.reason
         return self
 
     def sway(self, amplitude: float = 0.2, period: float = 2.0) -> "Lab":

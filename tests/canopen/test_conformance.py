@@ -502,7 +502,7 @@ def test_software_limits_clamp_and_show(bench):
 @pytest.mark.parametrize("method", [1, 17, 35, 37])
 def test_homing_makes_the_switch_zero(method):
     bench = Bench()
-    bench.dut._home_switch = 3000.0
+    bench.dut.home_switch = 3000.0
     bench.write(0x6098, 0, method, 1)
     bench.write(0x6099, 1, 10_000, 4)
     bench.write(0x6060, 0, 6, 1)

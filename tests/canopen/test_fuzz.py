@@ -74,7 +74,7 @@ def test_frames_that_mean_nothing_change_nothing(lab, total):
     lab.run(0.1)
     counts = lab.master.feedback().statistics
     assert counts.foreign + counts.malformed == count
-    assert lab.master.phase == BusState.ENABLED, lab.master.reason
+    assert lab.master.state == BusState.ENABLED, lab.master.reason
     np.testing.assert_allclose(positions(lab), before, atol=1.0)
     lab.sway()
     lab.run(1.05)
@@ -93,11 +93,11 @@ def test_forged_feedback_may_stop_the_arm_but_never_move_it(lab, total):
         # actual one: the drives' own speed limit and following error bound that, so it
         # is looked at before it is acknowledged.
         assert moved.max() <= 2.0
-        if lab.master.phase == BusState.STOPPED:
+        if lab.master.state == BusState.STOPPED:
             stops += 1
             lab.run(0.5)
             lab.master.acknowledge()
-            lab.until(lambda: lab.master.phase != BusState.STARTING)
+            lab.until(lambda: lab.master.state != BusState.STARTING)
             before = positions(lab)
     assert stops > 0
 
@@ -117,7 +117,7 @@ def test_nodes_survive_anything_while_not_enabled(make_lab, total):
     lab.run(0.1)
     # After all that, a bring-up that restores the defaults works.
     for node in lab.rack.nodes:
-        node.store._saved = {}
+        node.store.write(0x1011, 1, b"load")
     for drive in lab.bus.drives.values():
         drive.restore = True
     make_lab.bring_up(lab)

@@ -24,12 +24,12 @@ def log(tmp_path_factory):
     bus = load_bus(models_path("bus", "painter.bus.yaml"))
     rack, records = Rack(bus), []
     rack.wire.attach(lambda frame, now: records.append(LogRecord(START + now, frame)))
-    master, fault_at, end, cycle = ArmBus(bus, rack.link), None, None, 0
+    master, fault_at, end, cycle = ArmBus(bus, rack.transport), None, None, 0
     master.start()
     while end is None or cycle * bus.cycle < end:
         now = cycle * bus.cycle
         rack.advance(now)
-        if master.phase == BusState.ENABLED:
+        if master.state == BusState.ENABLED:
             if end is None:
                 fault_at, end = now + 0.5, now + 0.7
             moved = np.full(5, 0.05 * max(0.0, now - fault_at + 0.5))

@@ -110,7 +110,7 @@ def test_setpoints_are_carried_out_when_stamped_and_measured_in_time(loop):
     # that is due at its own time only 5 ms later. 0.1 rad/s: 10 ms would be 1 mrad.
     expected = path.vector_values(time[late] - body.clock.ahead - 0.005)
     assert np.abs(q[:, late] - expected).max() < 1e-4
-    assert loop.bus.report().feedback.phase == BusState.ENABLED
+    assert loop.bus.report().feedback.bus_state == BusState.ENABLED
 
 
 def test_a_stop_of_the_bus_is_a_fault_with_its_reason(loop):

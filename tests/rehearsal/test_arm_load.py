@@ -18,7 +18,7 @@ def lab():
     """Drives that carry the arm in its home pose, switched off."""
     lab = Lab()
     lab.rack = Rack(lab.bus, ArmLoad(load_scenario("cubes")))
-    lab.master = ArmBus(lab.bus, lab.rack.link)
+    lab.master = ArmBus(lab.bus, lab.rack.transport)
     return lab
 
 
@@ -30,10 +30,10 @@ def test_the_arm_does_not_sag_while_its_brakes_open(lab):
     home = np.deg2rad(load_scenario("cubes").motion.home_deg)
     positions = []
     lab.master.start()
-    while lab.master.phase == BusState.STARTING:
+    while lab.master.state == BusState.STARTING:
         lab.step()
         positions.append(axes(lab))
-    assert lab.master.phase == BusState.ENABLED, lab.master.reason
+    assert lab.master.state == BusState.ENABLED, lab.master.reason
     np.testing.assert_allclose(lab.master.feedback().q, home, atol=1e-5)
     counts = 65536 * 100 / (2 * np.pi)
     # Unpowered for 0.1 s at a tenth of gravity, a joint would turn by 5 mrad.
@@ -58,7 +58,7 @@ def test_an_axis_that_is_held_stays_and_trips(lab):
     lab.run(0.4)
     lab.rack.inject(Fault.FOLLOWING_ERROR, "base_yaw")
     held = lab.rack.drives["base_yaw"].motor.position
-    lab.until(lambda: lab.master.phase == BusState.STOPPED, 1.0)
+    lab.until(lambda: lab.master.state == BusState.STOPPED, 1.0)
     assert "base_yaw: EMCY 8611h, following error" in lab.master.reason
     lab.run(0.5)
     counts = 65536 * 100 / (2 * np.pi)

@@ -23,7 +23,7 @@ from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import BusProcess
 from painter.canopen.protocol.frames import ERROR_BUS_OFF, SYNC_ID, Frame
 from painter.canopen.wire.candump import read_log
-from painter.canopen.wire.links import PythonCanTransport, TransportError
+from painter.canopen.wire.transports import PythonCanTransport, TransportError
 from painter.resources import models_path
 
 CHANNEL = os.environ.get("PAINTER_CAN")
@@ -40,10 +40,10 @@ def wait_for(condition, what):
     return found
 
 
-def phase_is(process, phase):
+def state_is(process, state):
     def check():
         report = process.report()
-        return report if report and report.feedback.phase == phase else None
+        return report if report and report.feedback.bus_state == state else None
 
     return check
 
@@ -89,7 +89,7 @@ def drives(bus):
 def enabled(bus, drives, tmp_path):
     with BusProcess(bus, log=tmp_path / "bus.log") as process:
         process.start()
-        wait_for(phase_is(process, BusState.ENABLED), "not enabled")
+        wait_for(state_is(process, BusState.ENABLED), "not enabled")
         yield process
 
 
@@ -110,17 +110,17 @@ def move(process, goal):
 def test_the_arm_is_enabled_moves_and_stops(enabled):
     goal = np.array([0.1, 0.1, 0.1, 0.1, -0.1])
     move(enabled, goal)
-    assert enabled.report().feedback.phase == BusState.ENABLED
+    assert enabled.report().feedback.bus_state == BusState.ENABLED
     enabled.stop("a test says so.")
-    wait_for(phase_is(enabled, BusState.STOPPED), "not stopped")
+    wait_for(state_is(enabled, BusState.STOPPED), "not stopped")
     enabled.acknowledge()
-    wait_for(phase_is(enabled, BusState.ENABLED), "not enabled again")
+    wait_for(state_is(enabled, BusState.ENABLED), "not enabled again")
     move(enabled, np.zeros(5))
 
 
 def test_bus_off_stops_the_arm_and_an_acknowledgement_starts_it(enabled, tmp_path):
     send_raw(ERROR_FLAG | ERROR_BUS_OFF)
-    report = wait_for(phase_is(enabled, BusState.STOPPED), "not stopped")
+    report = wait_for(state_is(enabled, BusState.STOPPED), "not stopped")
     assert "bus-off" in report.feedback.reason
     recover(enabled)
     move(enabled, np.full(5, 0.05))
@@ -136,11 +136,11 @@ def test_bus_off_stops_the_arm_and_an_acknowledgement_starts_it(enabled, tmp_pat
 def test_a_link_that_goes_down_stops_the_arm_until_it_is_back(enabled, drives):
     set_link("down")
     try:
-        report = wait_for(phase_is(enabled, BusState.STOPPED), "not stopped")
+        report = wait_for(state_is(enabled, BusState.STOPPED), "not stopped")
         assert "bus lost" in report.feedback.reason
         enabled.acknowledge()
-        refusal = wait_for(lambda: enabled.report().refusal, "not refused")
-        assert "still lost" in refusal
+        rejection = wait_for(lambda: enabled.report().rejection, "not refused")
+        assert "still lost" in rejection
     finally:
         set_link("up")
     recover(enabled)
@@ -155,11 +155,11 @@ def recover(process):
     def is_enabled():
         report = process.report()
         feedback = report.feedback
-        seen.append((feedback.phase, feedback.reason, report.refusal))
-        if feedback.phase == BusState.STOPPED:
+        seen.append((feedback.bus_state, feedback.reason, report.rejection))
+        if feedback.bus_state == BusState.STOPPED:
             process.acknowledge()
             time.sleep(0.5)
-        return feedback.phase == BusState.ENABLED
+        return feedback.bus_state == BusState.ENABLED
 
     wait_for(is_enabled, seen)
 
@@ -195,21 +195,21 @@ def test_logs_of_candump_itself_are_read(tmp_path):
         peer = subprocess.Popen(
             ["candump", "-L", f"{CHANNEL},0:0,#FFFFFFFF"], stdout=out
         )
-        link = PythonCanTransport("socketcan", CHANNEL, 1_000_000)
+        transport = PythonCanTransport("socketcan", CHANNEL, 1_000_000)
         sent = [Frame(SYNC_ID), Frame(0x185, bytes(range(8)))]
-        wait_for(lambda: _passes(link, log), "candump does not start")
+        wait_for(lambda: _passes(transport, log), "candump does not start")
         for frame in sent:
-            link.send(frame)
+            transport.send(frame)
         send_raw(ERROR_FLAG | ERROR_BUS_OFF)
         wait_for(lambda: "20000040#" in log.read_text(), "no error frame")
         peer.terminate()
         peer.wait()
-        link.close()
+        transport.close()
     frames = [record.frame for record in read_log(log).records]
     assert frames[-3:] == [*sent, Frame(ERROR_BUS_OFF, bytes(8), is_error=True)]
 
 
-def _passes(link, log):
-    link.send(Frame(0x7FF))
+def _passes(transport, log):
+    transport.send(Frame(0x7FF))
     time.sleep(0.2)
     return "7FF#" in log.read_text()

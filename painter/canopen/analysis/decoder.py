@@ -8,7 +8,7 @@ import enum
 from dataclasses import dataclass
 
 from painter.canopen.analysis.object_names import object_text
-from painter.canopen.analysis.words import ValueWords
+from painter.canopen.analysis.value_text import ValueFormatter
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.units import AXES
 from painter.canopen.master.drive_client import DriveClient
@@ -98,7 +98,7 @@ class Decoder:
         self._names = {client.node_id: client.name for client in clients}
         self._names[bus.master_id] = "master"
         self._words = {
-            client.node_id: ValueWords(
+            client.node_id: ValueFormatter(
                 bus, client.units if isinstance(client, DriveClient) else None
             )
             for client in clients

@@ -41,7 +41,7 @@ class LogBus:
             listener.take(record)
         self._feedbacks = listener.feedbacks
         self._times = np.array([feedback.time for feedback in self._feedbacks])
-        enabled = [f.time for f in self._feedbacks if f.phase == BusState.ENABLED]
+        enabled = [f.time for f in self._feedbacks if f.bus_state == BusState.ENABLED]
         if not enabled:
             raise InputError(
                 "the log holds no time at which all drives are enabled.",
@@ -105,7 +105,7 @@ class _Listener:
         self._nodes = nodes
         self._valve = 1 << bus.io.valve_bit
         self._full_flow = bus.io.flow_full_scale
-        self._phase, self._reason, self._stopped_at = BusState.STARTING, "", 0.0
+        self._state, self._reason, self._stopped_at = BusState.STARTING, "", 0.0
         # Drives go on saying that they are enabled for a cycle after a stop.
         self._has_left = True
         # What the drives answer to a SYNC was measured at it.
@@ -128,9 +128,9 @@ class _Listener:
         if frame.cob_id == RPDO_BASES[0] + node.node_id:
             self._take_command(node, frame.data)
         elif frame.cob_id >= SYNC_ID:
-            node.is_configured = self._phase == BusState.ENABLED
+            node.is_configured = self._state == BusState.ENABLED
             node.take(frame, now)
-            if node.alarm is not None and self._phase == BusState.ENABLED:
+            if node.alarm is not None and self._state == BusState.ENABLED:
                 self._stop(node.alarm, now)
             node.alarm = None
 
@@ -145,7 +145,7 @@ class _Listener:
 
     def _stop(self, reason: str, now: float) -> None:
         if not self._reason:
-            self._phase, self._reason, self._stopped_at = BusState.STOPPED, reason, now
+            self._state, self._reason, self._stopped_at = BusState.STOPPED, reason, now
             self._has_left = False
 
     def _note(self, time: float) -> None:
@@ -155,7 +155,7 @@ class _Listener:
         targets = [d.units.angle(d.target) for d in self._drives]
         feedback = Feedback(
             time=time,
-            phase=self._phase,
+            bus_state=self._state,
             reason=self._reason,
             stopped_at=self._stopped_at,
             q=_joints(axes),
@@ -173,21 +173,21 @@ class _Listener:
             self.feedbacks.append(feedback)
 
     def _watch(self, now: float) -> None:
-        """Derives the phase from what the drives say and are told."""
+        """Derives the bus state from what the drives say and are told."""
         is_enabled = all(drive.state == State.ENABLED for drive in self._drives)
         is_told = all(
             command_of(d.controlword) == Command.ENABLE_OPERATION for d in self._drives
         )
-        if self._phase != BusState.ENABLED:
+        if self._state != BusState.ENABLED:
             self._has_left |= not (is_enabled and is_told)
             if is_enabled and is_told and self._has_left:
-                self._phase, self._reason, self._stopped_at = BusState.ENABLED, "", 0.0
+                self._state, self._reason, self._stopped_at = BusState.ENABLED, "", 0.0
             return
-        complaints = [d.complaint(must_be_enabled=True) for d in self._drives]
+        complaints = [d.stop_reason(must_be_enabled=True) for d in self._drives]
         if not is_told:
             complaints.append("the master stopped the arm.")
         if self._io.inputs is not None:
-            complaints.insert(0, self._io.complaint())
+            complaints.insert(0, self._io.stop_reason())
         found = next((text for text in complaints if text), None)
         if found is not None:
             self._stop(found, now)

@@ -38,9 +38,9 @@ def load_bus(path: Path) -> BusConfig:
             f"{path}: {' '.join(str(error).split())}", code="PNT-BUSFILE-002"
         ) from error
     for name in AXES:
-        refusal = mode_problem(bus.drives[name], bus.device(name))
-        if refusal:
-            raise InputError(f"{path}: drives.{name}.{refusal}", code="PNT-BUSFILE-003")
+        problem = mode_problem(bus.drives[name], bus.device(name))
+        if problem:
+            raise InputError(f"{path}: drives.{name}.{problem}", code="PNT-BUSFILE-003")
     return bus
 
 

@@ -23,7 +23,7 @@ from painter.canopen.master.node_client import (
     run_concurrently,
 )
 from painter.canopen.master.setpoints import Setpoint
-from painter.canopen.master.watch import LoadMeter, first_complaint
+from painter.canopen.master.watch import LoadMeter, first_stop_reason
 from painter.canopen.protocol.cia402 import Command
 from painter.canopen.protocol.frames import (
     ERROR_BUS_OFF,
@@ -32,7 +32,7 @@ from painter.canopen.protocol.frames import (
     Frame,
     frame_time,
 )
-from painter.canopen.wire.links import CanTransport, TransportError
+from painter.canopen.wire.transports import CanTransport, TransportError
 from painter.errors import BusError
 from perception.ground import FloatArray
 
@@ -43,18 +43,18 @@ _REOPEN_EVERY = 0.25
 class ArmBus:
     """Brings nodes up, streams setpoints, watches, stops."""
 
-    def __init__(self, bus: BusConfig, link: CanTransport) -> None:
+    def __init__(self, bus: BusConfig, transport: CanTransport) -> None:
         """Creates the master; nothing is sent yet.
 
         Args:
             bus: What is on the bus.
-            link: The way to it.
+            transport: The way to it.
 
         Raises:
             InputError: A drive's EDS does not allow its configuration.
         """
         self._bus = bus
-        self._link = link
+        self._transport = transport
         limits = bus.drive_limits()
         self.drives = [
             DriveClient(axis, bus, limit, self._send)
@@ -69,7 +69,7 @@ class ArmBus:
             timeout=bus.timeouts.setpoint,
             sync_time=frame_time(0, bus.bitrate),
         )
-        self.phase = BusState.DOWN
+        self.state = BusState.DOWN
         self.reason = ""
         self._stopped_at = 0.0
         # Called right before each SYNC, to take its time.
@@ -112,9 +112,9 @@ class ArmBus:
         Raises:
             BusError: Nothing is latched, or the cause is still there; names it.
         """
-        if self.phase != BusState.STOPPED:
+        if self.state != BusState.STOPPED:
             raise BusError(
-                f"nothing to acknowledge: the bus is {self.phase}.", code="PNT-BUS-001"
+                f"nothing to acknowledge: the bus is {self.state}.", code="PNT-BUS-001"
             )
         if self._is_lost:
             raise BusError(
@@ -128,7 +128,7 @@ class ArmBus:
         self.reason, self._stopped_at = "", 0.0
         self._follower.release()
         self._begin(
-            self._start_up([n for n in self.nodes if not n.is_sound(self._now)])
+            self._start_up([n for n in self.nodes if not n.is_healthy(self._now)])
         )
 
     def push(self, points: Sequence[Setpoint]) -> None:
@@ -137,7 +137,7 @@ class ArmBus:
         Raises:
             ValueError: They are not in order of time, or not finite.
         """
-        if self.phase != BusState.ENABLED:
+        if self.state != BusState.ENABLED:
             return
         self._follower.push(points)
 
@@ -148,11 +148,11 @@ class ArmBus:
             reason: Said in the feedback until it is acknowledged.
             quick: By the drives' quick stop, else by a ramp that stays enabled.
         """
-        was, self.io.trigger = self.phase, 0.0
+        was, self.io.trigger = self.state, 0.0
         if not self.reason:
             self.reason, self._stopped_at = reason, self._now
             _LOGGER.warning("stopped: %s", reason)
-        self.phase = BusState.STOPPED
+        self.state = BusState.STOPPED
         if self._script is not None:
             self._script.close()
             self._script = None
@@ -167,7 +167,7 @@ class ArmBus:
 
     def shut_down(self) -> None:
         """Begins to switch off: ramp, brakes, power."""
-        if self.phase in (BusState.ENABLED, BusState.STARTING):
+        if self.state in (BusState.ENABLED, BusState.STARTING):
             self.stop("switched off.")
         self._begin(self._switch_off(self._now + self._follower.braking_time))
 
@@ -207,14 +207,14 @@ class ArmBus:
             self._reopen(now)
         else:
             try:
-                frames = self._link.receive(timeout)
+                frames = self._transport.receive(timeout)
             except TransportError as error:
                 self._lose(f"bus lost: {error}")
         for frame in frames:
             self._take(frame, now)
         if self._is_lost:
             return
-        if self.phase != BusState.DOWN and now >= self._next_heartbeat:
+        if self.state != BusState.DOWN and now >= self._next_heartbeat:
             self._next_heartbeat = now + self._bus.timeouts.heartbeat / 3.0
             state = bytes([OPERATIONAL])
             self._send(Frame(HEARTBEAT_BASE + self._bus.master_id, state))
@@ -228,7 +228,7 @@ class ArmBus:
         q, v = self._actual()
         return Feedback(
             time=self._now,
-            phase=self.phase,
+            bus_state=self.state,
             reason=self.reason,
             stopped_at=self._stopped_at,
             q=q,
@@ -251,7 +251,7 @@ class ArmBus:
     def _begin(self, script: Script) -> None:
         if self._script is not None:
             self._script.close()
-        self.phase = BusState.STARTING
+        self.state = BusState.STARTING
         self._script = script
 
     def _advance_script(self) -> None:
@@ -290,7 +290,7 @@ class ArmBus:
         for drive in self.drives:
             yield from drive.home()
         self._follower.stand(self._actual()[0])
-        self.phase = BusState.ENABLED
+        self.state = BusState.ENABLED
 
     def _switch_off(self, standing: float) -> Script:
         """Waits until the arm stands, at a time, s; then brakes and power."""
@@ -301,14 +301,14 @@ class ArmBus:
         if self._is_cyclic:
             yield from run_concurrently([drive.disable() for drive in self.drives])
         self._is_cyclic = False
-        self.phase = BusState.DOWN
+        self.state = BusState.DOWN
 
     # The cycle's parts.
 
     def _follow(self, now: float) -> None:
         """Takes the command of this cycle to the drives."""
         follower = self._follower
-        if self.phase != BusState.ENABLED and not follower.is_braking:
+        if self.state != BusState.ENABLED and not follower.is_braking:
             return
         problem = follower.step(now)
         if problem is not None:
@@ -342,7 +342,7 @@ class ArmBus:
         if self._counts["cycles"] > 0:
             self._counts["missing"] += came.count(False)
         # Scripts that wait for a new one clear the flag themselves.
-        if self.phase != BusState.STARTING:
+        if self.state != BusState.STARTING:
             for drive in self.drives:
                 drive.got_tpdo = False
 
@@ -352,21 +352,21 @@ class ArmBus:
         for node in self.nodes:
             if node.alarm is not None and self._is_cyclic:
                 alarm, node.alarm = node.alarm, None
-                if self.phase != BusState.STARTING or not node.is_configured:
+                if self.state != BusState.STARTING or not node.is_configured:
                     self.stop(alarm, quick=True)
         if (
-            self.phase not in (BusState.ENABLED, BusState.STOPPED)
+            self.state not in (BusState.ENABLED, BusState.STOPPED)
             or not self._is_cyclic
         ):
             return
-        held = self.phase == BusState.ENABLED or self._follower.is_braking
-        complaint = first_complaint(
+        held = self.state == BusState.ENABLED or self._follower.is_braking
+        complaint = first_stop_reason(
             self._bus, self.drives, self.io, now=now, must_be_enabled=held
         )
         if complaint is not None and held:
             self.stop(complaint, quick=True)
 
-    # The link.
+    # The transport.
 
     def _take(self, frame: Frame, now: float) -> None:
         self._meter.note(frame, self._now)
@@ -385,7 +385,7 @@ class ArmBus:
             return
         self._meter.note(frame, self._now)
         try:
-            self._link.send(frame)
+            self._transport.send(frame)
         except TransportError as error:
             self._lose(f"bus lost: {error}")
 
@@ -399,7 +399,7 @@ class ArmBus:
             return
         self._reopen_at = now + _REOPEN_EVERY
         try:
-            self._link.reopen()
+            self._transport.reopen()
         except TransportError as error:
             _LOGGER.debug("still lost: %s", error)
             return

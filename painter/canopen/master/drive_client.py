@@ -88,10 +88,10 @@ class DriveClient(NodeClient):
         self.is_homed = False
         self.is_homing = False
 
-    def is_sound(self, now: float) -> bool:
-        """See `NodeClient.is_sound`; its process data comes too."""
+    def is_healthy(self, now: float) -> bool:
+        """See `NodeClient.is_healthy`; its process data comes too."""
         few = self.missed * self._cycle < self._timeouts.tpdo
-        return few and super().is_sound(now)
+        return few and super().is_healthy(now)
 
     @property
     def is_measured(self) -> bool:
@@ -148,7 +148,7 @@ class DriveClient(NodeClient):
             statusword=self.statusword,
         )
 
-    def complaint(self, *, must_be_enabled: bool) -> str | None:
+    def stop_reason(self, *, must_be_enabled: bool) -> str | None:
         """Returns what in the statusword must stop the arm, or None."""
         if self.state in (State.FAULT, State.FAULT_REACTION):
             return f"{self.name}: drive fault, {self.fault_text()}."

@@ -64,7 +64,7 @@ class Feedback:
 
     Attributes:
         time: Clock of the bus, s.
-        phase: What the bus does.
+        bus_state: What the bus does.
         reason: Why it stopped; empty while it did not.
         stopped_at: When it stopped, s; 0 while it did not.
         q: (5,) measured joint positions, rad.
@@ -79,7 +79,7 @@ class Feedback:
     """
 
     time: float
-    phase: BusState
+    bus_state: BusState
     reason: str
     stopped_at: float
     q: FloatArray

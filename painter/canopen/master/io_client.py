@@ -17,7 +17,7 @@ class IoClient(NodeClient):
         trigger: Commanded share of nominal flow, 0 to 1; 0 closes the valve.
         inputs: Last digital inputs; None before the first.
         pressure: Last pump pressure, Pa.
-        again_at: When the gun is to be told again, s.
+        repeat_at: When the gun is to be told again, s.
     """
 
     def __init__(self, bus: BusConfig, send: Callable[[Frame], None]) -> None:
@@ -33,7 +33,7 @@ class IoClient(NodeClient):
         )
         self._config = bus.io
         self._half_cycle = bus.cycle / 2.0
-        self.again_at = math.inf
+        self.repeat_at = math.inf
         self.trigger = 0.0
         self.inputs: int | None = None
         self.pressure = 0.0
@@ -56,8 +56,8 @@ class IoClient(NodeClient):
     def poll(self, now: float) -> None:
         """Lets time pass; tells the gun what it was told half a cycle ago."""
         super().poll(now)
-        if now >= self.again_at:
-            self.again_at = math.inf
+        if now >= self.repeat_at:
+            self.repeat_at = math.inf
             self._send(self.rpdo())
 
     def tell(self) -> None:
@@ -68,7 +68,7 @@ class IoClient(NodeClient):
         """
         if self.is_configured:
             self._send(self.rpdo())
-            self.again_at = self.now + self._half_cycle
+            self.repeat_at = self.now + self._half_cycle
 
     def rpdo(self) -> Frame:
         """Returns the frame with valve and flow."""
@@ -77,7 +77,7 @@ class IoClient(NodeClient):
         data = bytes([valve]) + flow.to_bytes(2, "little", signed=True)
         return Frame(RPDO_BASES[0] + self.node_id, data)
 
-    def complaint(self) -> str | None:
+    def stop_reason(self) -> str | None:
         """Returns what in the inputs must stop the arm, or None."""
         if not self.is_chain_closed:
             return "e-stop: the chain is open."

@@ -115,7 +115,7 @@ class NodeClient:
         """
         return False
 
-    def is_sound(self, now: float) -> bool:
+    def is_healthy(self, now: float) -> bool:
         """Whether it can go on after a stop without being configured anew."""
         recent = now - self.heard <= self._timeouts.heartbeat
         return self.is_configured and recent and self.nmt == OPERATIONAL

@@ -12,7 +12,7 @@ from painter.canopen.protocol.frames import Frame, frame_time
 _WINDOW = 1.0
 
 
-def first_complaint(
+def first_stop_reason(
     bus: BusConfig,
     drives: Sequence[DriveClient],
     io: IoClient,
@@ -40,10 +40,10 @@ def first_complaint(
         # In cycles, not seconds: a master that is late itself must not blame a drive.
         if drive.missed * bus.cycle >= timeouts.tpdo:
             return f"{drive.name}: no TPDO for {drive.missed} cycles."
-        complaint = drive.complaint(must_be_enabled=must_be_enabled)
+        complaint = drive.stop_reason(must_be_enabled=must_be_enabled)
         if complaint:
             return complaint
-    return io.complaint()
+    return io.stop_reason()
 
 
 class LoadMeter:

@@ -35,7 +35,7 @@ from painter.canopen.process.realtime import (
 )
 from painter.canopen.process.sample_ring import SampleRing, Samples
 from painter.canopen.wire.frame_log import FrameLogger, TappedTransport
-from painter.canopen.wire.links import CanTransport, open_transport
+from painter.canopen.wire.transports import CanTransport, open_transport
 from painter.errors import BusError, PainterError
 from painter.timebase import TimeBase
 
@@ -52,13 +52,13 @@ class Report:
 
     Attributes:
         feedback: State of the arm.
-        refusal: Why the last command was refused; empty if it was not.
+        rejection: Why the last command was refused; empty if it was not.
         lateness: How late cycles began; renewed every second.
         is_fifo: Whether the loop runs under SCHED_FIFO.
     """
 
     feedback: Feedback
-    refusal: str = ""
+    rejection: str = ""
     lateness: Lateness | None = None
     is_fifo: bool = False
 
@@ -86,20 +86,20 @@ class BusLoop:
             clock: The run's; None = the machine's.
 
         Raises:
-            PainterError: The link cannot be opened, or an EDS not be used.
+            PainterError: The transport cannot be opened, or an EDS not be used.
         """
         self._clock = clock or TimeBase()
-        link = open_transport(bus)
-        self._link: CanTransport = (
-            link if log is None else TappedTransport(link, log, self._clock)
+        transport = open_transport(bus)
+        self._transport: CanTransport = (
+            transport if log is None else TappedTransport(transport, log, self._clock)
         )
-        self._master = ArmBus(bus, self._link)
+        self._master = ArmBus(bus, self._transport)
         self._commands = commands
         self._mailbox = mailbox
         self._ticker = Ticker(bus.cycle, self._clock)
-        self._master.before_sync = self._ticker.meet
+        self._master.before_sync = self._ticker.wait_until_due
         self._master.measured = ring.put
-        self._refusal = ""
+        self._rejection = ""
         self._lateness: Lateness | None = None
         self._is_fifo = False
         self._end_at: float | None = None
@@ -111,7 +111,7 @@ class BusLoop:
         lock_memory()
         with stay_awake():
             self._cycle_until_ended()
-        self._link.close()
+        self._transport.close()
 
     def _cycle_until_ended(self) -> None:
         per_second = max(1, round(1.0 / self._ticker.period))
@@ -121,7 +121,7 @@ class BusLoop:
             while (remaining := self._ticker.remaining()) > 0.0:
                 # Frames between two SYNCs are read at once: a fault need not wait.
                 now = self._clock.now()
-                again = max(0.0, self._clock.machine(self._master.io.again_at - now))
+                again = max(0.0, self._clock.machine(self._master.io.repeat_at - now))
                 self._master.poll(now, min(remaining, again))
                 if self._ticker.remaining() > 0.0:
                     self._pause()
@@ -134,21 +134,21 @@ class BusLoop:
             self._mailbox.put(
                 Report(
                     self._master.feedback(),
-                    self._refusal,
+                    self._rejection,
                     self._lateness,
                     self._is_fifo,
                 )
             )
 
     def _pause(self) -> None:
-        """Leaves the processor for a moment while the link cannot be waited for."""
+        """Sleeps until the next tick while there is no transport to wait on."""
         if self._master.is_lost:
             time.sleep(self._ticker.remaining())
 
     def _has_ended(self) -> bool:
         if self._end_at is None:
             return False
-        is_off = self._master.phase in (BusState.DOWN, BusState.STOPPED)
+        is_off = self._master.state in (BusState.DOWN, BusState.STOPPED)
         return (is_off and self._master.is_idle) or self._clock.now() > self._end_at
 
     def _take_commands(self) -> None:
@@ -173,12 +173,12 @@ class BusLoop:
             elif word == "stop":
                 self._master.stop(str(argument))
             elif word == "acknowledge":
-                self._refusal = ""
+                self._rejection = ""
                 self._master.acknowledge()
             elif word == "end":
                 self._end(0.0)
         except (BusError, ValueError) as error:
-            self._refusal = str(error)
+            self._rejection = str(error)
             if isinstance(error, ValueError):
                 self._master.stop(f"setpoints: {error}")
 
@@ -281,7 +281,7 @@ class BusProcess:
         self._send("stop", reason)
 
     def acknowledge(self) -> None:
-        """Asks to begin again after a stop; a refusal is in the report."""
+        """Asks to begin again after a stop; a rejection is in the report."""
         self._send("acknowledge")
 
     def report(self) -> Report | None:

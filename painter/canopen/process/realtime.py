@@ -140,7 +140,7 @@ class Ticker:
         self.due = due + self.period
         return due, skipped
 
-    def meet(self) -> None:
+    def wait_until_due(self) -> None:
         """Watches the clock until the last tick is due, and notes how late that is."""
         due = self.due - self.period
         while (late := self._clock.now() - due) < 0.0:

@@ -60,7 +60,7 @@ class SimDrive(SimNode):
         self.brake_time = brake_time
         self.brake_stuck = False
         self._units = units
-        self._home_switch = home_switch
+        self.home_switch = home_switch
         self._moved = 0.0
         self._offset = 0.0  # Drive position of motor position 0.
         self.store.fix(0x608F, 1, round(units.counts_per_turn))
@@ -317,7 +317,7 @@ class SimDrive(SimNode):
         if mode == Mode.HOMING:
             self._homed = False
             method = self.store.number(0x6098)
-            self._homing = HomingRun(method, self._home_switch + self._offset)
+            self._homing = HomingRun(method, self.home_switch + self._offset)
 
     def _move(self, dt: float) -> None:
         if self.state == State.FAULT_REACTION:

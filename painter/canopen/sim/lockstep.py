@@ -33,7 +33,7 @@ class LockstepBus:
         """Puts a master on a rack's wire."""
         self.rack = rack
         self._bus = rack.bus
-        self.master: ArmBus | None = ArmBus(rack.bus, rack.link)
+        self.master: ArmBus | None = ArmBus(rack.bus, rack.transport)
         self.master.measured = self._note
         self._steps = 0
         self._per_cycle = round(rack.bus.cycle / STEP)
@@ -84,7 +84,7 @@ class LockstepBus:
             return
         self.master.shut_down()
         end = self.now() + _SWITCH_OFF_TIME
-        while self.master.phase != BusState.DOWN and self.now() < end:
+        while self.master.state != BusState.DOWN and self.now() < end:
             self._step()
 
     def _step(self) -> None:

@@ -15,7 +15,7 @@ from painter.canopen.sim.load import Load
 from painter.canopen.sim.motor import LoadedMotor
 from painter.canopen.sim.node import Nmt, SimNode
 from painter.canopen.sim.wire import Wire
-from painter.canopen.wire.links import TransportError
+from painter.canopen.wire.transports import TransportError
 
 STEP = 0.001
 
@@ -64,7 +64,7 @@ class Rack:
                     drive.store.fix(0x1018, sub, wanted)
             self.drives[name] = drive
         self.io = SimIo(bus.io.node_id, self.wire)
-        self.link = WireTransport(self)
+        self.transport = WireTransport(self)
         self.now = 0.0
         # Called after each step of 1 ms.
         self.stepped: Callable[[], None] = lambda: None
@@ -161,9 +161,9 @@ class Rack:
         elif fault == Fault.PRESSURE_LOW:
             self.io.pressure = 0
         elif fault == Fault.BUS_OFF:
-            self.link.bus_off()
+            self.transport.bus_off()
         elif fault == Fault.INTERFACE_DOWN:
-            self.link.is_down = True
+            self.transport.is_down = True
 
     def clear(self) -> None:
         """Ends all faults that last; tripped drives still need their reset."""
@@ -176,7 +176,7 @@ class Rack:
             drive.store.fix(0x608F, 1, round(self.bus.drives[name].counts_per_turn))
         self.io.inputs = 0xFF
         self.io.pressure = 100
-        self.link.is_down = False
+        self.transport.is_down = False
 
 
 class WireTransport:

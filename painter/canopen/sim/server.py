@@ -1,4 +1,4 @@
-"""Simulated drives as a process: a rack in real time, behind a link."""
+"""Simulated drives as a process: a rack in real time, behind a transport."""
 
 import contextlib
 import math
@@ -13,7 +13,7 @@ from painter.canopen.process.realtime import freeze_gc
 from painter.canopen.protocol.frames import SYNC_ID, Frame
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.rack import STEP, Rack
-from painter.canopen.wire.links import (
+from painter.canopen.wire.transports import (
     CanTransport,
     TransportError,
     open_transport,
@@ -113,16 +113,17 @@ class LocalHub:
 
 
 class RackServer:
-    """Runs a rack in real time and carries frames between its wire and a link.
+    """Runs a rack in real time and carries frames between its wire and a transport.
 
-    Frames from the link take their time on the wire like all others, so what the rack
-    charges is what a real bus would. While drives are operational and SYNCs come, the
-    rack's time is theirs: from each to the next the cycle that the drives were told.
-    One that is late is waited for, and then the rack's clock goes on from when it was
-    due; one that is early puts it forward.
+    Frames from the transport take their time on the wire like all others, so the bus
+    load is that of a real bus. While drives are operational and SYNCs come, SYNCs drive
+    the rack's clock: from one to the next it advances by the cycle that was written to
+    the drives (60C2h). It waits for a late SYNC and then continues from when that was
+    due; an early SYNC advances it.
 
     Attributes:
         rack: The simulated nodes.
+        transport: To the master.
         slips: How often the rack's time fell behind for good.
         sync_late: Longest time from when a SYNC was due until it was taken, s by the
             run's clock.
@@ -131,7 +132,7 @@ class RackServer:
     def __init__(
         self, bus: BusConfig, load: Load | None = None, clock: TimeBase | None = None
     ) -> None:
-        """Opens the link of the bus file ("local" listens) and powers the rack.
+        """Opens the transport of the bus file ("local" listens) and powers the rack.
 
         Args:
             bus: What is on the bus.
@@ -139,10 +140,10 @@ class RackServer:
             clock: The run's; None = the machine's.
 
         Raises:
-            TransportError: The link cannot be opened.
+            TransportError: The transport cannot be opened.
         """
         self.rack = Rack(bus, load)
-        self._link: CanTransport = (
+        self.transport: CanTransport = (
             LocalHub(bus.channel) if bus.interface == "local" else open_transport(bus)
         )
         self._send = self.rack.wire.attach(self._to_link)
@@ -159,15 +160,15 @@ class RackServer:
         """Runs until `is_done`, which is asked about every ms with the rack's time."""
         freeze_gc()
         while not is_done(self.rack.now):
-            self._serve()
+            self.serve()
 
     def clock_time(self) -> float:
         """Returns the rack's present time by the run's clock, s."""
         return self._origin + self.rack.now
 
     def close(self) -> None:
-        """Gives the link up."""
-        self._link.close()
+        """Gives the transport up."""
+        self.transport.close()
 
     def _now(self) -> float:
         """Time of the rack; it slips when this process was held up for long."""
@@ -185,7 +186,8 @@ class RackServer:
         due = self._sync_due
         return now if now > due + _PATIENCE else min(now, due)
 
-    def _serve(self) -> None:
+    def serve(self) -> None:
+        """Waits up to a step for frames, takes them, and advances the rack."""
         frames = self._receive(self._clock.machine(self._wait(self._now())))
         now = self._now()
         for frame in frames:
@@ -206,11 +208,11 @@ class RackServer:
 
     def _receive(self, wait: float) -> list[Frame]:
         try:
-            return self._link.receive(wait)
+            return self.transport.receive(wait)
         except TransportError:
             self._clock.sleep(STEP)
             with contextlib.suppress(TransportError):
-                self._link.reopen()
+                self.transport.reopen()
         return []
 
     def _take_sync(self, now: float) -> float:
@@ -239,4 +241,4 @@ class RackServer:
 
     def _to_link(self, frame: Frame, now: float) -> None:
         with contextlib.suppress(TransportError):
-            self._link.send(frame)
+            self.transport.send(frame)

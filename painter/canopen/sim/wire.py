@@ -34,7 +34,7 @@ class Wire:
             bitrate: Bits a second.
         """
         self._bitrate = bitrate
-        self._receivers: list[Receiver] = []
+        self.receivers: list[Receiver] = []
         self._pending: list[_Pending] = []
         self._order = itertools.count()
         self._free = 0.0
@@ -50,8 +50,8 @@ class Wire:
         Returns:
             A function that sends a frame from this port at a time, s.
         """
-        port = len(self._receivers)
-        self._receivers.append(receiver)
+        port = len(self.receivers)
+        self.receivers.append(receiver)
 
         def send(frame: Frame, now: float) -> None:
             item = _Pending(frame.cob_id, next(self._order), now, port, frame)
@@ -77,11 +77,11 @@ class Wire:
             self._free = end
             self.busy_time += end - start
             self.frame_count += 1
-            self._deliver(item.frame, item.port, end)
+            self.deliver(item.frame, item.port, end)
 
-    def _deliver(self, frame: Frame, sender: int, end: float) -> None:
+    def deliver(self, frame: Frame, sender: int, end: float) -> None:
         """Hands a frame to all ports but its sender's."""
-        for port, receive in enumerate(self._receivers):
+        for port, receive in enumerate(self.receivers):
             if port != sender:
                 receive(frame, end)
 

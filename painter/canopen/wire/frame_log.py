@@ -1,6 +1,6 @@
 """Writes what passes on the bus to a log, without holding up the bus.
 
-`TappedTransport` stands before a link and puts copies of all frames into a pipe; a
+`TappedTransport` stands before a transport and puts copies of all frames into a pipe; a
 process of its own, below everything else, makes text of them. The bus process never
 waits: a pipe that is full loses frames of the log, and the log's writer says how many.
 When the bus process dies, what it sent before is in the log.
@@ -19,7 +19,7 @@ from pathlib import Path
 
 from painter.canopen.protocol.frames import Frame
 from painter.canopen.wire.candump import LogRecord, format_record
-from painter.canopen.wire.links import CanTransport
+from painter.canopen.wire.transports import CanTransport
 from painter.errors import InputError
 from painter.timebase import TimeBase
 
@@ -37,19 +37,19 @@ _END_TIME = 60.0  # s; on a machine that works on other things.
 
 
 class TappedTransport:
-    """A link whose frames are copied into a pipe."""
+    """A transport whose frames are copied into a pipe."""
 
     def __init__(
-        self, link: CanTransport, pipe: Connection, clock: TimeBase | None = None
+        self, transport: CanTransport, pipe: Connection, clock: TimeBase | None = None
     ) -> None:
-        """Stands before a link.
+        """Stands before a transport.
 
         Args:
-            link: The way to the bus.
+            transport: The way to the bus.
             pipe: Write end to a `FrameLogger`.
             clock: The run's; None = the machine's.
         """
-        self._link = link
+        self._transport = transport
         self._pipe = pipe
         os.set_blocking(pipe.fileno(), False)
         # Wall-clock time that goes on evenly when the clock is set.
@@ -60,25 +60,25 @@ class TappedTransport:
 
     def send(self, frame: Frame) -> None:
         """Sends a frame; raises TransportError when the way is lost."""
-        self._link.send(frame)
+        self._transport.send(frame)
         self._note(frame, _SENT)
 
     def receive(self, timeout: float) -> list[Frame]:
         """Returns frames that came; raises TransportError when the way is lost."""
         if timeout > 0.0 or len(self._pending) >= _MOST_AT_ONCE:
             self._flush()
-        frames = self._link.receive(timeout)
+        frames = self._transport.receive(timeout)
         for frame in frames:
             self._note(frame, 0)
         return frames
 
     def reopen(self) -> None:
         """Opens the way again; raises TransportError when it cannot be."""
-        self._link.reopen()
+        self._transport.reopen()
 
     def close(self) -> None:
         """Gives the way up and ends the log."""
-        self._link.close()
+        self._transport.close()
         self._flush()
         self._pipe.close()
 

@@ -85,7 +85,7 @@ class CanopenArm(LeafSystem):
         """
         super().__init__()
         report = bus.report()
-        if report is None or report.feedback.phase != BusState.ENABLED:
+        if report is None or report.feedback.bus_state != BusState.ENABLED:
             raise BusError("the drives are not enabled.", code="PNT-CYCLE-009")
         self._bus = bus
         self._clock = clock
@@ -171,8 +171,8 @@ class CanopenArm(LeafSystem):
 def arm_status(feedback: Feedback) -> ArmStatus:
     """Returns the bus's feedback as the brain sees it."""
     stopped = feedback.reason
-    if not stopped and feedback.phase != BusState.ENABLED:
-        stopped = f"the bus is {feedback.phase}."
+    if not stopped and feedback.bus_state != BusState.ENABLED:
+        stopped = f"the bus is {feedback.bus_state}."
     return ArmStatus(
         drives=tuple(
             DriveStatus(

@@ -4,7 +4,11 @@ import pytest
 
 from painter.canopen.analysis.decoder import Decoder, Kind
 from painter.canopen.analysis.log_summary import LogSummary
-from painter.canopen.analysis.words import controlword_text, mode_text, statusword_text
+from painter.canopen.analysis.value_text import (
+    controlword_text,
+    mode_text,
+    statusword_text,
+)
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.config.device import Mode
 from painter.canopen.protocol.frames import Frame, frame_time

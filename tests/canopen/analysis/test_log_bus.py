@@ -37,7 +37,7 @@ def test_samples_are_where_the_arm_was_at_each_sync(recorded):
     recorded.trigger = 0.8
     recorded.run(1.5)
     dut = LogBus(recorded.bus, recorded.records)
-    assert dut.report().feedback.phase == BusState.ENABLED
+    assert dut.report().feedback.bus_state == BusState.ENABLED
     dut.wait_until(dut.end)
     samples = dut.samples(dut.begin)
     times, q = zip(*recorded.truth, strict=True)
@@ -62,7 +62,7 @@ def test_time_passes_only_when_told(recorded):
     assert dut.now() == dut.begin + 0.1
     dut.push([Setpoint(dut.now(), np.ones(5), np.zeros(5))])
     dut.stop("has no effect.")
-    assert dut.report().feedback.phase == BusState.ENABLED
+    assert dut.report().feedback.bus_state == BusState.ENABLED
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_what_stopped_the_arm_is_named(recorded, fault, words):
     dut = LogBus(recorded.bus, recorded.records)
     dut.wait_until(dut.end)
     feedback = dut.report().feedback
-    assert feedback.phase == BusState.STOPPED
+    assert feedback.bus_state == BusState.STOPPED
     assert words in feedback.reason
     # Within the step in which it was injected; the heartbeat's time-out is 0.3 s.
     assert at - 0.005 <= feedback.stopped_at <= at + 0.4

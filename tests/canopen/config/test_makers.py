@@ -100,8 +100,8 @@ def test_each_maker_stops_with_the_others(makers, axis):
     assert lab.rack.io.outputs == 0
     lab.path = None
     lab.master.acknowledge()
-    lab.until(lambda: lab.master.phase != BusState.STARTING)
-    assert lab.master.phase == BusState.ENABLED, lab.master.reason
+    lab.until(lambda: lab.master.state != BusState.STARTING)
+    assert lab.master.state == BusState.ENABLED, lab.master.reason
 
 
 def test_a_value_beyond_the_drives_range_is_refused(make_lab, tmp_path):
@@ -119,7 +119,7 @@ def test_homing_in_the_drives(make_lab, tmp_path):
     )  # fmt: skip
     lab = make_lab(bus)
     units = bus.drives["base_yaw"].units()
-    lab.rack.drives["base_yaw"]._home_switch = units.counts(0.3)
+    lab.rack.drives["base_yaw"].home_switch = units.counts(0.3)
     lab.rack.drives["wrist_right"].motor.position = 4321.0
     lab.bring_up()
     # The switch is at 0.3 rad of the motor; the drive calls it 0.25 rad.
@@ -137,9 +137,9 @@ def test_homing_in_the_drives(make_lab, tmp_path):
 def test_homing_that_takes_too_long_stops(make_lab, tmp_path):
     homing = {"kind": "drive", "method": 1, "speed_switch": 0.01, "timeout": 1.0}
     lab = make_lab(load_bus(write_bus(tmp_path, {"base_yaw": {"homing": homing}})))
-    lab.rack.drives["base_yaw"]._home_switch = 1e6
+    lab.rack.drives["base_yaw"].home_switch = 1e6
     lab.master.start()
-    lab.until(lambda: lab.master.phase != BusState.STARTING)
+    lab.until(lambda: lab.master.state != BusState.STARTING)
     assert "base_yaw: homing 1 not done within 1 s" in lab.master.reason
     lab.run(0.5)
     assert lab.rack.drives["base_yaw"].state == State.QUICK_STOP
@@ -151,7 +151,7 @@ def test_a_value_that_reads_back_differently_ends_bring_up(make_lab):
     # A drive that rounds its ramp and says nothing.
     store.written = lambda i, sub, v: i == 0x6085 and store.set(i, sub, int(v) // 2)
     lab.master.start()
-    lab.until(lambda: lab.master.phase != BusState.STARTING)
+    lab.until(lambda: lab.master.state != BusState.STARTING)
     assert "elbow_pitch: quick stop deceleration (6085h:0) was written" in (
         lab.master.reason
     )
@@ -160,15 +160,15 @@ def test_a_value_that_reads_back_differently_ends_bring_up(make_lab):
 def test_lost_sdo_answers_are_asked_for_again(make_lab):
     lab = make_lab()
     drive = lab.rack.drives["base_yaw"]
-    serve, dropped = drive._serve, []
+    answer, dropped = drive.sdo.answer, []
 
     def lossy(request):
         if len(dropped) < 10 and lab.cycles % 3 == 0:
             dropped.append(request)
-            return
-        serve(request)
+            return None
+        return answer(request)
 
-    drive._serve = lossy
+    drive.sdo.answer = lossy
     lab.bring_up()
     assert len(dropped) == 10
     assert lab.master.feedback().statistics.retries >= 5

@@ -61,7 +61,7 @@ def test_the_arm_follows_its_setpoints(lab):
     # A cycle of interpolation and one of feedback at a turning point: about 1e-5 rad,
     # and counts of 2.4e-6 rad.
     np.testing.assert_allclose(q - q_start, 0.4, atol=2e-3)
-    assert lab.master.phase == BusState.ENABLED
+    assert lab.master.state == BusState.ENABLED
 
 
 def test_the_wrist_turns_as_the_planner_thinks(lab):
@@ -104,7 +104,7 @@ def test_a_fault_stops_all_axes_and_closes_the_gun(
     lab = painting
     injected = lab.now
     lab.rack.inject(fault, axis)
-    lab.until(lambda: lab.master.phase == BusState.STOPPED, 2.0)
+    lab.until(lambda: lab.master.state == BusState.STOPPED, 2.0)
     known = lab.now
     assert reason in lab.master.reason
     assert known - injected <= cycles * CYCLE + 1e-9
@@ -128,16 +128,16 @@ def test_after_a_fault_the_job_goes_on_once_acknowledged(
 ):
     lab = painting
     lab.rack.inject(fault, axis)
-    lab.until(lambda: lab.master.phase == BusState.STOPPED, 2.0)
+    lab.until(lambda: lab.master.state == BusState.STOPPED, 2.0)
     lab.path, lab.trigger = None, 0.0
     lab.run(1.0)
-    assert lab.master.phase == BusState.STOPPED
+    assert lab.master.state == BusState.STOPPED
     assert reason in lab.master.reason
     lab.rack.clear()
     lab.run(0.5)
     lab.master.acknowledge()
-    lab.until(lambda: lab.master.phase != BusState.STARTING)
-    assert lab.master.phase == BusState.ENABLED, lab.master.reason
+    lab.until(lambda: lab.master.state != BusState.STARTING)
+    assert lab.master.state == BusState.ENABLED, lab.master.reason
     before = lab.master.feedback().q
     lab.sway()
     lab.run(1.0)
@@ -159,8 +159,8 @@ def test_bring_up_ends_with_the_reason(make_lab, fault, reason):
     lab = make_lab()
     lab.rack.inject(fault)
     lab.master.start()
-    lab.until(lambda: lab.master.phase != BusState.STARTING)
-    assert lab.master.phase == BusState.STOPPED
+    lab.until(lambda: lab.master.state != BusState.STARTING)
+    assert lab.master.state == BusState.STOPPED
     assert reason in lab.master.reason
     lab.run(0.5)
     # Nothing stays under power but what holds itself by a quick stop.
@@ -169,14 +169,14 @@ def test_bring_up_ends_with_the_reason(make_lab, fault, reason):
     lab.rack.clear()
     lab.run(0.1)
     lab.master.acknowledge()
-    lab.until(lambda: lab.master.phase != BusState.STARTING)
-    assert lab.master.phase == BusState.ENABLED, lab.master.reason
+    lab.until(lambda: lab.master.state != BusState.STARTING)
+    assert lab.master.state == BusState.ENABLED, lab.master.reason
 
 
 def test_setpoints_that_stay_away_are_a_controlled_stop(painting):
     lab = painting
     lab.path = None
-    lab.until(lambda: lab.master.phase == BusState.STOPPED, 1.0)
+    lab.until(lambda: lab.master.state == BusState.STOPPED, 1.0)
     assert "setpoints: none for" in lab.master.reason
     assert closing_time(lab) <= lab.now + CYCLE
     lab.run(0.5)
@@ -195,7 +195,7 @@ def test_setpoints_may_end_at_rest(lab):
     lab.path = None
     lab.master.push([Setpoint(t, q, np.zeros(5))])
     lab.run(1.0)
-    assert lab.master.phase == BusState.ENABLED
+    assert lab.master.state == BusState.ENABLED
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_a_setpoint_out_of_bounds_is_not_followed(lab, joint, value, reason):
     wrong[joint] = value
     lab.master.push([Setpoint(lab.now, wrong, np.zeros(5))])
     lab.step()
-    assert lab.master.phase == BusState.STOPPED
+    assert lab.master.state == BusState.STOPPED
     assert reason in lab.master.reason
     lab.run(0.3)
     np.testing.assert_allclose(lab.master.feedback().q, q, atol=1e-5)
@@ -235,7 +235,7 @@ def test_low_pressure_stops_only_while_spraying(make_lab):
     lab = make_lab(lab.bus).bring_up()
     lab.rack.inject(Fault.PRESSURE_LOW)
     lab.run(0.2)
-    assert lab.master.phase == BusState.ENABLED
+    assert lab.master.state == BusState.ENABLED
     lab.sway()
     lab.trigger = 1.0
     lab.run(0.2)
@@ -285,7 +285,7 @@ def test_a_skipped_cycle_makes_the_arm_wait_and_not_jump(lab, make_lab):
     speed = []
     lab.rack.stepped = lambda: speed.append(lab.rack.drives["base_yaw"].demand.velocity)
     lab.run(0.5)
-    assert lab.master.phase == BusState.ENABLED, lab.master.reason
+    assert lab.master.state == BusState.ENABLED, lab.master.reason
     counts = 65536 * 100 / (2 * np.pi)
     assert np.abs(speed).max() / counts < 1.73 * 1.03
     # 5 ms are made up for at 2 % in 0.25 s.
@@ -296,15 +296,15 @@ def test_a_skipped_cycle_makes_the_arm_wait_and_not_jump(lab, make_lab):
     assert worst < 1e-3
 
 
-class LateLink:
+class LateTransport:
     """What drives send is held up on its way for some cycles."""
 
     def __init__(self, lab):
-        self._rack, self._receive = lab.rack, lab.rack.link.receive
+        self._rack, self._receive = lab.rack, lab.rack.transport.receive
         self._held = deque()
         self.delay = 0.0
         self.lost = None
-        lab.rack.link.receive = self.receive
+        lab.rack.transport.receive = self.receive
 
     def receive(self, timeout):
         now = self._rack.now
@@ -319,17 +319,17 @@ class LateLink:
 
 @pytest.mark.parametrize("late", [1, 3])
 def test_what_comes_late_is_not_taken_for_where_the_arm_is_now(lab, late):
-    samples, link = [], LateLink(lab)
+    samples, transport = [], LateTransport(lab)
     lab.master.measured = lambda *sample: samples.append(sample)
     lab.sway()
     path, start = lab.path, lab.now
     lab.run(0.5)
-    link.delay = late * lab.bus.cycle
+    transport.delay = late * lab.bus.cycle
     lab.step()
     before = len(samples)
     lab.run(0.1)
     assert len(samples) == before
-    link.delay = 0.0
+    transport.delay = 0.0
     lab.run(0.4)
     times = np.array([time for time, *_ in samples])
     assert times[-1] == pytest.approx(lab.now - 2 * lab.bus.cycle, abs=1e-9)
@@ -340,21 +340,21 @@ def test_what_comes_late_is_not_taken_for_where_the_arm_is_now(lab, late):
 
 
 def test_a_frame_that_was_lost_is_not_waited_for_for_ever(lab):
-    samples, link = [], LateLink(lab)
+    samples, transport = [], LateTransport(lab)
     lab.master.measured = lambda *sample: samples.append(sample)
-    link.lost = 0x180 + lab.bus.drives["base_yaw"].node_id
+    transport.lost = 0x180 + lab.bus.drives["base_yaw"].node_id
     lab.step()
-    link.lost = None
+    transport.lost = None
     lab.run(0.1)
     assert not [time for time, *_ in samples if time > lab.now - 0.09]
     lab.run(0.5)
     assert samples[-1][0] == pytest.approx(lab.now - 2 * lab.bus.cycle, abs=1e-9)
-    assert lab.master.phase == BusState.ENABLED
+    assert lab.master.state == BusState.ENABLED
 
 
 def test_switching_off_closes_the_brakes(lab):
     lab.master.shut_down()
-    lab.until(lambda: lab.master.phase == BusState.DOWN)
+    lab.until(lambda: lab.master.state == BusState.DOWN)
     assert all(drive.brake_closed for drive in lab.rack.drives.values())
     states = {drive.state for drive in lab.rack.drives.values()}
     assert states == {State.SWITCH_ON_DISABLED}

@@ -19,7 +19,7 @@ from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import BusProcess
 from painter.canopen.process.mailbox import Mailbox
 from painter.canopen.wire.candump import read_log
-from painter.canopen.wire.links import LocalTransport, TransportError
+from painter.canopen.wire.transports import LocalTransport, TransportError
 from painter.errors import BusError
 from painter.resources import models_path
 
@@ -52,7 +52,11 @@ def bus(tmp_path):
 
 @pytest.fixture
 def drives(bus):
-    code = "from painter.cli.main import main; main()"
+    # A script starts background jobs with SIGINT ignored; children inherit that.
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from painter.cli.main import main; main()"
+    )
     command = [sys.executable, "-c", code, "drives", "--json"]
     command += ["--interface", "local", "--channel", bus.channel]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -72,10 +76,10 @@ def drives(bus):
     process.communicate(timeout=PATIENCE)
 
 
-def phase_is(process, phase):
+def state_is(process, state):
     def check():
         report = process.report()
-        return report if report and report.feedback.phase == phase else None
+        return report if report and report.feedback.bus_state == state else None
 
     return check
 
@@ -83,7 +87,7 @@ def phase_is(process, phase):
 def test_the_arm_moves_and_switches_off(bus, drives):
     with BusProcess(bus) as dut:
         dut.start()
-        report = wait_for(phase_is(dut, BusState.ENABLED), "not enabled")
+        report = wait_for(state_is(dut, BusState.ENABLED), "not enabled")
         q0, start = report.feedback.q, time.monotonic() + 0.2
         goal, duration = np.array([0.1, 0.1, 0.1, 0.1, -0.1]), 0.5
         points = []
@@ -97,22 +101,22 @@ def test_the_arm_moves_and_switches_off(bus, drives):
             lambda: np.allclose(dut.report().feedback.q, q0 + goal, atol=1e-3),
             "the goal is not reached",
         )
-        assert dut.report().feedback.phase == BusState.ENABLED
+        assert dut.report().feedback.bus_state == BusState.ENABLED
         dut.stop("a test says so.")
-        wait_for(phase_is(dut, BusState.STOPPED), "not stopped")
+        wait_for(state_is(dut, BusState.STOPPED), "not stopped")
         assert dut.report().feedback.reason == "a test says so."
         dut.acknowledge()
-        wait_for(phase_is(dut, BusState.ENABLED), "not enabled again")
+        wait_for(state_is(dut, BusState.ENABLED), "not enabled again")
     assert not dut.is_alive
 
 
 def test_a_refused_command_is_in_the_report(bus, drives):
     with BusProcess(bus) as dut:
         dut.acknowledge()
-        refusal = wait_for(
-            lambda: (r := dut.report()) and r.refusal, "nothing was refused"
+        rejection = wait_for(
+            lambda: (r := dut.report()) and r.rejection, "nothing was refused"
         )
-        assert "nothing to acknowledge" in refusal
+        assert "nothing to acknowledge" in rejection
 
 
 def test_a_bus_that_cannot_be_opened_says_why(bus):
@@ -130,8 +134,11 @@ def test_the_arm_stops_when_the_commanding_program_is_killed(bus, drives, tmp_pa
         if __name__ == "__main__":
             dut = BusProcess(pickle.loads(sys.stdin.buffer.read()))
             dut.start()
-            while not ((r := dut.report()) and r.feedback.phase == BusState.ENABLED):
+            state = None
+            while state != BusState.ENABLED:
                 time.sleep(0.01)
+                report = dut.report()
+                state = report and report.feedback.bus_state
             print(dut.pid, flush=True)
             time.sleep(1000)
     """)
@@ -167,7 +174,7 @@ def test_drives_stop_and_the_log_is_whole_when_the_bus_process_is_killed(
     log = tmp_path / "bus.log"
     dut = BusProcess(bus, log=log)
     dut.start()
-    wait_for(phase_is(dut, BusState.ENABLED), "not enabled")
+    wait_for(state_is(dut, BusState.ENABLED), "not enabled")
     os.kill(dut.pid, signal.SIGKILL)
     wait_for(lambda: not dut.is_alive, "still alive")
     with pytest.raises(BusError, match="has ended"):

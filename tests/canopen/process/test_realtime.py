@@ -23,7 +23,7 @@ def test_ticks_come_one_period_apart(clock):
     clock[0] = 100.0051
     due, skipped = dut.tick()
     assert (due, skipped) == (pytest.approx(100.005), 0)
-    dut.meet()
+    dut.wait_until_due()
     assert dut.lateness().worst == pytest.approx(1e-4)
     assert dut.remaining() == pytest.approx(0.0044)
 
@@ -44,7 +44,7 @@ def test_at_half_the_rate_a_period_takes_the_machine_twice_as_long(clock):
     assert dut.remaining() == pytest.approx(0.0095)
     clock[0] = 100.0102
     assert dut.tick() == (pytest.approx(50.005), 0)
-    dut.meet()
+    dut.wait_until_due()
     # Lateness is the machine's: that is what is judged.
     assert dut.lateness().worst == pytest.approx(2e-4)
 
@@ -61,7 +61,7 @@ def test_an_early_loop_waits_for_the_due_time(monkeypatch):
     due = dut.due
     now[0] = due - 0.0004
     assert dut.tick() == (due, 0)
-    dut.meet()
+    dut.wait_until_due()
     assert due <= now[0] <= due + 1.5e-5
     assert 0.0 <= dut.lateness().worst <= 1.5e-5
 
@@ -71,7 +71,7 @@ def test_percentiles_are_those_of_the_lateness(clock):
     for i in range(100):
         clock[0] = 101.0 + i + i * 1e-3
         dut.tick()
-        dut.meet()
+        dut.wait_until_due()
     late = dut.lateness()
     assert late.count == 100
     assert late.p50 == pytest.approx(49.5e-3)

@@ -24,7 +24,7 @@ def bench(tmp_path, monkeypatch):
     bus = load_bus(models_path("bus", "painter.bus.yaml"))
     bus = dataclasses.replace(bus, interface="local", channel=str(tmp_path / "can"))
     bench.server = RackServer(bus)
-    bench.server._link.receive = bench.receive
+    bench.server.transport.receive = bench.receive
     bench.server.rack.wire.attach(bench.hear)
     bench.tell(milliseconds=5)
     yield bench
@@ -55,7 +55,7 @@ class Bench:
         """Serves each quarter of a millisecond."""
         while self.now < time:
             self.now += 0.00025
-            self.server._serve()
+            self.server.serve()
 
     def syncs(self):
         return [time for cob_id, time in self.heard if cob_id == SYNC_ID]

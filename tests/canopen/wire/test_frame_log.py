@@ -13,7 +13,7 @@ from painter.errors import InputError
 
 
 class Loop:
-    """A link that gives back what is sent."""
+    """A transport that gives back what is sent."""
 
     def __init__(self):
         self.frames = []

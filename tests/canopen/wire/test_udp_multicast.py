@@ -25,10 +25,10 @@ _PROGRAM = textwrap.dedent("""
     from painter.canopen.master.setpoints import Setpoint
     from painter.resources import models_path
 
-    def wait_for(dut, phase):
+    def wait_for(dut, state):
         while True:
             report = dut.report()
-            if report is not None and report.feedback.phase == phase:
+            if report is not None and report.feedback.bus_state == state:
                 return report.feedback
             time.sleep(0.01)
 
@@ -57,7 +57,7 @@ _PROGRAM = textwrap.dedent("""
             while np.abs(dut.report().feedback.q - q0 - 0.1).max() > 1e-3:
                 time.sleep(0.01)
             feedback = dut.report().feedback
-            assert feedback.phase == BusState.ENABLED, feedback.reason
+            assert feedback.bus_state == BusState.ENABLED, feedback.reason
             # Own frames come back with UDP; none of them was taken for a node's.
             assert feedback.statistics.foreign == 0, feedback.statistics
         drives.send_signal(signal.SIGINT)

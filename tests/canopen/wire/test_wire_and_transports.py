@@ -6,7 +6,7 @@ import pytest
 from painter.canopen.protocol.frames import Frame, frame_bits, frame_time
 from painter.canopen.sim.server import LocalHub
 from painter.canopen.sim.wire import Wire
-from painter.canopen.wire.links import (
+from painter.canopen.wire.transports import (
     LocalTransport,
     PythonCanTransport,
     TransportError,

@@ -169,19 +169,19 @@ class LocalTransport:
     def reopen(self) -> None:
         """Connects anew."""
         self.close()
-        link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
-            link.connect(self._path)
+            connection.connect(self._path)
         except OSError as error:
-            link.close()
+            connection.close()
             raise TransportError(
                 f"local {self._path}: {error.strerror}.", code="PNT-BUS-036"
             ) from error
-        self._socket = link
+        self._socket = connection
 
     def send(self, frame: Frame) -> None:
         """Sends a frame."""
-        self._do(lambda link: link.send(pack_frame(frame)))
+        self._do(lambda connection: connection.send(pack_frame(frame)))
 
     def receive(self, timeout: float) -> list[Frame]:
         """Returns frames that came; waits up to `timeout` s for the first one."""
@@ -216,12 +216,12 @@ class LocalTransport:
             ) from error
 
 
-def _receive(link: socket.socket, *, wait: float) -> bytes | None:
+def _receive(connection: socket.socket, *, wait: float) -> bytes | None:
     # select() waits to the microsecond; a socket's own time-out is whole milliseconds.
-    ready, _, _ = select.select([link], [], [], wait)
+    ready, _, _ = select.select([connection], [], [], wait)
     if not ready:
         return None
-    packet = link.recv(64)
+    packet = connection.recv(64)
     if not packet:
         raise ConnectionResetError(104, "the other side closed")
     return packet

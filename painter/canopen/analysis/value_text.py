@@ -74,7 +74,7 @@ def mode_text(mode: int) -> str:
     return Mode(mode).name.replace("_", " ") if is_known else "not used here"
 
 
-class ValueWords:
+class ValueFormatter:
     """Values of the objects of one node."""
 
     def __init__(self, bus: BusConfig, units: AxisUnits | None) -> None:

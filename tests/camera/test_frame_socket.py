@@ -5,13 +5,13 @@ import time
 import numpy as np
 import pytest
 
-from painter.camera.frame_link import FrameLink, FrameServer
+from painter.camera.frame_socket import FrameClient, FrameServer
 from painter.camera.frames import CameraError
 
 
 def test_pictures_arrive_whole_and_when_they_are_due(tmp_path):
     path = str(tmp_path / "camera")
-    server, dut = FrameServer(path), FrameLink(path, latency=0.2)
+    server, dut = FrameServer(path), FrameClient(path, latency=0.2)
     assert dut.wait_frame(0.0) is None
     rng = np.random.default_rng(1)
     depth = rng.integers(0, 4000, (4, 6), dtype=np.uint16)
@@ -34,4 +34,4 @@ def test_pictures_arrive_whole_and_when_they_are_due(tmp_path):
 
 def test_nobody_there_is_said(tmp_path):
     with pytest.raises(CameraError, match="No such file"):
-        FrameLink(str(tmp_path / "none"), latency=0.1).wait_frame(0.1)
+        FrameClient(str(tmp_path / "none"), latency=0.1).wait_frame(0.1)

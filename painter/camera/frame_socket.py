@@ -1,7 +1,7 @@
 """Pictures from one process to another over a local socket.
 
-`FrameServer` stands beside a renderer or player, `FrameLink` is a `FrameSource` on the
-other side, such as librealsense's software device is fed from.
+`FrameServer` sends what a renderer or player makes. `FrameClient` receives it; it is a
+`FrameSource` and feeds librealsense's software device.
 """
 
 import contextlib
@@ -77,7 +77,7 @@ class FrameServer:
             self._path.unlink()
 
 
-class FrameLink:
+class FrameClient:
     """Pictures of a `FrameServer`; a `FrameSource`.
 
     Every picture is handed on when it is `latency` old, as those of a camera are, so
@@ -104,8 +104,8 @@ class FrameLink:
     ) -> tuple[DepthArray, ColorArray | None, float] | None:
         """See `FrameSource`."""
         try:
-            link = self._connected()
-            if not select.select([link], [], [], timeout)[0]:
+            connection = self._connected()
+            if not select.select([connection], [], [], timeout)[0]:
                 return None
             magic, when, height, width, has_color = _HEAD.unpack(self._read(_HEAD.size))
             if magic != _MAGIC:
@@ -132,14 +132,14 @@ class FrameLink:
 
     def _connected(self) -> socket.socket:
         if self._socket is None:
-            link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             try:
-                link.connect(self._path)
+                connection.connect(self._path)
             except OSError:
-                link.close()
+                connection.close()
                 raise
-            link.settimeout(_RECEIVE_TIME)
-            self._socket = link
+            connection.settimeout(_RECEIVE_TIME)
+            self._socket = connection
         return self._socket
 
     def _read(self, size: int) -> bytearray:
