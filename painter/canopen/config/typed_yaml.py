@@ -1,91 +1,106 @@
-"""Reads plain YAML data into dataclasses, with errors that name the field."""
+"""Reads plain YAML data into dataclasses, with errors that name the field.
+
+cattrs builds the values. This module makes it strict (cattrs would read a number from
+text) and turns its tree of errors into one line: the first one with its field.
+"""
 
 import dataclasses
 import enum
-import types
 import typing
+from collections.abc import Callable
 from typing import Any, TypeVar
+
+import cattrs
+from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn
 
 T = TypeVar("T")
 
-_WORDS = {
+_EXPECTED = {
     float: "a number",
     int: "a whole number",
-    str: "a word",
+    str: "text",
     bool: "true or false",
 }
+_CONVERTER = cattrs.Converter()
 
 
-def read_typed(schema: type[T], data: object, where: str = "") -> T:
+def read_typed(schema: type[T], data: object) -> T:
     """Makes a `schema` of YAML data.
 
     Args:
-        schema: A dataclass whose fields are numbers, words, enums, dataclasses, lists
-            and dictionaries of these, or one of them or None.
+        schema: A dataclass whose fields are numbers, text, enums of text, dataclasses
+            or dictionaries of these.
         data: What the YAML reader returned.
-        where: Name of the field that holds the data; empty at the top.
 
     Returns:
         The value; missing fields have their defaults.
 
     Raises:
-        ValueError: A field is unknown, missing or of another type; names it.
+        ValueError: A field is unknown, missing or of another type; names the field, the
+            value and what is expected.
     """
-    value: T = _read(schema, data, where)
-    return value
+    try:
+        return _CONVERTER.structure(data, schema)
+    except (cattrs.BaseValidationError, ValueError) as error:
+        raise ValueError(_describe(error)) from None
 
 
-def _read(schema: Any, data: object, where: str) -> Any:
-    origin = typing.get_origin(schema)
-    if origin in (types.UnionType, typing.Union):
-        if data is None:
-            return None
-        (kind,) = (k for k in typing.get_args(schema) if k is not types.NoneType)
-        return _read(kind, data, where)
-    if dataclasses.is_dataclass(schema):
-        return _read_fields(schema, data, where)
-    if origin is dict:
-        if not isinstance(data, dict):
-            raise ValueError(f"{where} must have fields, got {data!r}.")
-        _, kind = typing.get_args(schema)
-        return {str(k): _read(kind, v, _join(where, k)) for k, v in data.items()}
-    if origin is list:
-        if not isinstance(data, list):
-            raise ValueError(f"{where} must be a list, got {data!r}.")
-        (kind,) = typing.get_args(schema)
-        return [_read(kind, value, f"{where}[{i}]") for i, value in enumerate(data)]
-    if isinstance(schema, type) and issubclass(schema, enum.StrEnum):
-        if not isinstance(data, str) or data not in list(schema):
-            known = ", ".join(schema)
-            raise ValueError(f"{where} must be one of {known}; got {data!r}.")
-        return schema(data)
-    fits = isinstance(data, (int, float) if schema is float else schema)
-    if not fits or (isinstance(data, bool) and schema is not bool):
-        raise ValueError(f"{where} must be {_WORDS[schema]}, got {data!r}.")
-    return float(data) if isinstance(data, int) and schema is float else data
+def _is_record(kind: Any) -> bool:
+    return dataclasses.is_dataclass(kind) or typing.get_origin(kind) is dict
 
 
-def _read_fields(schema: Any, data: object, where: str) -> Any:
-    if data is None:
-        data = {}
-    if not isinstance(data, dict):
-        raise ValueError(f"{where or 'file'} must have fields, got {data!r}.")
-    fields = {field.name: field for field in dataclasses.fields(schema)}
-    values = {}
-    for key, value in data.items():
-        if key not in fields:
-            known = ", ".join(fields)
-            raise ValueError(f"{_join(where, key)} is unknown; known are: {known}.")
-        values[str(key)] = _read(fields[key].type, value, _join(where, key))
-    for name, field in fields.items():
-        required = (
-            field.default is dataclasses.MISSING
-            and field.default_factory is dataclasses.MISSING
+@_CONVERTER.register_structure_hook_factory(_is_record)
+def _record_reader(kind: Any) -> Callable[[object, Any], Any]:
+    build: Callable[[Any, Any], Any]
+    if dataclasses.is_dataclass(kind):
+        build = make_dict_structure_fn(
+            typing.cast(type[Any], kind), _CONVERTER, _cattrs_forbid_extra_keys=True
         )
-        if required and name not in values:
-            raise ValueError(f"{_join(where, name)} is missing.")
-    return schema(**values)
+    else:
+        build = make_mapping_structure_fn(kind, _CONVERTER)
+
+    def read(data: object, _: Any) -> Any:
+        if data is None:  # A key with nothing behind it.
+            data = {}
+        if not isinstance(data, dict):
+            raise ValueError(f"must have fields, got {data!r}.")
+        return build(data, kind)
+
+    return read
 
 
-def _join(where: str, key: object) -> str:
-    return f"{where}.{key}" if where else str(key)
+def _read_scalar(data: object, kind: type) -> Any:
+    fits = isinstance(data, (int, float) if kind is float else kind)
+    if not fits or (isinstance(data, bool) and kind is not bool):
+        raise ValueError(f"must be {_EXPECTED[kind]}, got {data!r}.")
+    return kind(data)
+
+
+def _read_enum(data: object, kind: type[enum.StrEnum]) -> enum.StrEnum:
+    if not isinstance(data, str) or data not in list(kind):
+        raise ValueError(f"must be one of {', '.join(kind)}; got {data!r}.")
+    return kind(data)
+
+
+for _kind in _EXPECTED:
+    _CONVERTER.register_structure_hook(_kind, _read_scalar)
+_CONVERTER.register_structure_hook(enum.StrEnum, _read_enum)
+
+
+def _describe(error: BaseException, field: str = "") -> str:
+    """Returns the first error of cattrs' tree as one line that names the field."""
+    if isinstance(error, cattrs.BaseValidationError):
+        first = error.exceptions[0]
+        # cattrs notes where in the data an error happened: a field, or a key.
+        for note in getattr(first, "__notes__", ()):
+            name = getattr(note, "name", getattr(note, "index", ""))
+            field = f"{field}.{name}" if field else str(name)
+        return _describe(first, field)
+    if isinstance(error, cattrs.ForbiddenExtraKeysError):
+        known = ", ".join(f.name for f in dataclasses.fields(error.cl))
+        extra = min(error.extra_fields)
+        name = f"{field}.{extra}" if field else extra
+        return f"{name} is unknown; known are: {known}."
+    if isinstance(error, KeyError):
+        return f"{field} is missing."
+    return f"{field or 'file'} {error}"
