@@ -50,7 +50,7 @@ class Robot:
         motion = MotionConfig()
         X_WT = X_WT or nominal_tile_pose(TileConfig())
         return TransitionPlanner(
-            gun=WallIk(self.kinematics, X_WT),
+            ik=WallIk(self.kinematics, X_WT),
             limits=planning_limits(self.limits, motion.limit_share),
             space=ClearSpace(
                 self.checker,

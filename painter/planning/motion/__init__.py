@@ -1,4 +1,4 @@
-"""Arm motion: blends, gun paths, transitions between strokes, dense verification.
+"""Arm motion: blends, gun paths, transitions between strokes, verification.
 
-Knows nothing of film.
+Knows nothing of film or of what the strokes are for.
 """

@@ -1,12 +1,11 @@
-"""Blends: the time law by which the arm gets from one moving state to another.
+"""Blends: the time law of a move between two moving states.
 
 A blend's acceleration has two plateaus, one in either half of its duration, reached by
-linear ramps; so its position is twice smooth and, between given end states, needs
-little more time and room than the least possible for a bound on acceleration. (A
-quintic polynomial between the same ends swings out 40 % farther.) The plateaus follow
-from the end states by a linear formula. Therefore any linear relation that holds
-between joints at both ends, such as q2 + q3 + q4 = 0 for a gun square to a plumb wall,
-holds all the way.
+linear ramps. Its position is twice continuously differentiable and needs little more
+time and room than the minimum for a bound on acceleration. (A quintic polynomial
+between the same ends swings out 40 % farther.) The plateaus are linear in the end
+states. So any linear relation between joints that holds at both ends, such as
+q2 + q3 + q4 = 0 for a gun square to a plumb wall, holds all along.
 """
 
 from dataclasses import dataclass
@@ -27,8 +26,8 @@ class MovingState(FrozenValue):
 
     Attributes:
         x: (n,) position.
-        v: (n,) its rate, 1/s.
-        a: (n,) the rate of that, 1/s².
+        v: (n,) velocity, 1/s.
+        a: (n,) acceleration, 1/s².
     """
 
     x: FloatArray
@@ -37,7 +36,7 @@ class MovingState(FrozenValue):
 
     @classmethod
     def at_rest(cls, x: FloatArray) -> "MovingState":
-        """Makes a standstill at `x`."""
+        """Makes a state at rest at `x`."""
         return cls(np.array(x, dtype=float), np.zeros(len(x)), np.zeros(len(x)))
 
     @classmethod
@@ -47,7 +46,7 @@ class MovingState(FrozenValue):
 
     @property
     def key(self) -> bytes:
-        """What tells it from any other state."""
+        """Identifies the state."""
         return np.concatenate([self.x, self.v, self.a]).tobytes()
 
 
@@ -57,7 +56,7 @@ def plateaus(
     """Returns the two accelerations of blends of several durations, each (k, n).
 
     Integrating the piecewise linear acceleration once and twice gives two equations,
-    linear in the plateaus; here they are solved.
+    linear in the plateaus; this solves them.
 
     Args:
         start: State at the start.
@@ -78,20 +77,20 @@ def plateaus(
 
 @dataclass(frozen=True, eq=False)
 class Shares(FrozenValue):
-    """Shares of a blend's duration at which blends are looked at.
+    """Shares of a blend's duration at which blends are sampled.
 
     Position and rate are linear in the accelerations at the start, on both plateaus and
-    at the end; with what weights depends on the share alone.
+    at the end; the weights depend on the share alone.
 
     Attributes:
-        s: (m,) shares; before 0 and after 1 a blend goes on at the velocity of that
+        s: (m,) shares; before 0 and after 1 a blend continues at the velocity of that
             end.
-        place: (m, 4) weights of the accelerations in the position, at duration 1 s.
-        rate: (m, 4) the same in its rate.
+        position: (m, 4) weights of the accelerations in the position, at 1 s duration.
+        rate: (m, 4) the same in the rate.
     """
 
     s: FloatArray
-    place: FloatArray
+    position: FloatArray
     rate: FloatArray
 
     @classmethod
@@ -102,8 +101,8 @@ class Shares(FrozenValue):
         u = (inside - KNOTS[piece])[:, None]
         a, jerk, v = _ACCELERATIONS[piece], _JERKS[piece], _RATES[piece]
         rate = v + u * (a + u * jerk / 2.0)
-        place = _PLACES[piece] + u * (v + u * (a / 2.0 + u * jerk / 6.0))
-        return cls(np.asarray(s), place + (s - inside)[:, None] * rate, rate)
+        position = _POSITIONS[piece] + u * (v + u * (a / 2.0 + u * jerk / 6.0))
+        return cls(np.asarray(s), position + (s - inside)[:, None] * rate, rate)
 
 
 def evaluate(
@@ -122,15 +121,15 @@ def evaluate(
     a[:, 0], a[:, 1], a[:, 2], a[:, 3] = start.a, first, second, end.a
     T = durations[:, None, None]
     rate = start.v + T * (shares.rate @ a)
-    place = start.x + T * (shares.s[:, None] * start.v + T * (shares.place @ a))
-    return place, rate
+    position = start.x + T * (shares.s[:, None] * start.v + T * (shares.position @ a))
+    return position, rate
 
 
 def _integrals() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Returns accelerations, their slopes, rates and places at the knots.
+    """Returns accelerations, their slopes, rates and positions at the knots.
 
     Each (6, 4), of a blend of duration 1 s from rest, for unit accelerations at the
-    start, on the two plateaus and at the end; of the slopes there is one a piece.
+    start, on the two plateaus and at the end; the slopes are one a piece.
     """
     a = np.eye(4)[[0, 1, 1, 2, 2, 3]]
     h = np.diff(KNOTS)[:, None]
@@ -142,4 +141,4 @@ def _integrals() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     return a, jerk, v, x
 
 
-_ACCELERATIONS, _JERKS, _RATES, _PLACES = _integrals()
+_ACCELERATIONS, _JERKS, _RATES, _POSITIONS = _integrals()

@@ -1,11 +1,10 @@
 """Paths of the gun's nozzle in front of the wall, timed by construction.
 
-The gun stays square to the wall, so a path is the nozzle's place before it over time:
-x, y and distance, which are its position in T where the wall is flat, and are laid on
-the wall's surface where it is not.
-Passes run at constant speed; blends join two passes. A blend's duration is the shortest
-that the joints allow, found on densely evaluated inverse kinematics instead of being
-left to a time parametriser, which can fail without saying so.
+The gun stays square to the wall, so a path is a position over time: x, y and distance.
+On a flat wall these are the nozzle's coordinates in T; elsewhere they follow the wall's
+surface. Passes run at constant speed; blends join two passes. A blend takes the
+shortest duration that the joints allow, found on densely sampled inverse kinematics:
+a time parametriser can fail without saying so.
 """
 
 import math
@@ -21,15 +20,15 @@ from painter.planning.motion.joint_motion import SEARCH_SHARE, shortest, within_
 from painter.planning.motion.surface_frame import SurfaceFrame
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
-# Where a blend's joint rates are looked at, with one sample before and one after, on
-# the passes that the blend joins.
+# Where a blend's joint rates are sampled, with one sample before and one after, on the
+# passes that the blend joins.
 _STEP = 1.0 / 48
 _SAMPLES = Shares.at(np.linspace(-_STEP, 1.0 + _STEP, 51))
-# Three of these each in the middle of both halves and of all: most blends that are too
-# fast are so there.
+# Three of these in the middle of each half and of the whole: most blends that are too
+# fast exceed their limits there.
 _FEW = Shares.at(_SAMPLES.s[[12, 13, 14, 24, 25, 26, 36, 37, 38]])
-_LONGEST = 8.0  # s, of a blend.
-_FASTEST = 4.0  # m/s, mean speed of a blend that no arm of this size exceeds.
+_LONGEST = 8.0  # s, longest blend tried.
+_FASTEST = 4.0  # m/s; no arm of this size has a blend of a higher mean speed.
 _DIFFERENCE = 1e-3  # s, half width of the central differences for joint states.
 
 
@@ -52,7 +51,7 @@ class Pass(FrozenValue):
         """Makes the pass between two points (3,), m, in T, at `speed`, m/s.
 
         Raises:
-            ValueError: The points are one and the same.
+            ValueError: The points coincide.
         """
         travel = np.asarray(p1_TG, dtype=float) - p0_TG
         length = float(np.linalg.norm(travel))
@@ -63,12 +62,12 @@ class Pass(FrozenValue):
 
     @property
     def start(self) -> MovingState:
-        """Nozzle in T at its start."""
+        """State of the nozzle in T at its start."""
         return MovingState.steady(self.p0_TG, self.v_TG)
 
     @property
     def end(self) -> MovingState:
-        """Nozzle in T at its end."""
+        """State of the nozzle in T at its end."""
         return MovingState.steady(self.p0_TG + self.duration * self.v_TG, self.v_TG)
 
     @property
@@ -83,34 +82,34 @@ class Pass(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class ToolBlend(FrozenValue):
-    """A blend of the nozzle's position, over an obstacle if it has a hop.
+    """A blend of the nozzle's position; a retract takes it over an obstacle.
 
     Attributes:
-        start: Nozzle in T at its start.
-        end: Nozzle in T at its end.
+        start: State of the nozzle in T at its start.
+        end: State of the nozzle in T at its end.
         duration: s.
-        hop: How far the gun draws back from the wall on the way, m.
-        rise: Share of the duration for drawing back, and again for coming down.
+        retract: How far the gun retracts from the wall on the way, m.
+        ramp_share: Share of the duration for the retract, and again for the return.
     """
 
     start: MovingState
     end: MovingState
     duration: float
-    hop: float = 0.0
-    rise: float = 0.5
+    retract: float = 0.0
+    ramp_share: float = 0.5
 
     @property
     def knots(self) -> FloatArray:
         """Times where its third derivative steps, s."""
-        ends_of_hop = [self.rise, 1.0 - self.rise] if self.hop else []
-        return self.duration * np.union1d(KNOTS, ends_of_hop)
+        ramps = [self.ramp_share, 1.0 - self.ramp_share] if self.retract else []
+        return self.duration * np.union1d(KNOTS, ramps)
 
     def p_TG(self, time: FloatArray) -> FloatArray:
         """Returns (n, 3) m, in T, at `time` (n,) s."""
         s = np.asarray(time) / self.duration
         shares = Shares.at(s)
         p_TG, _ = evaluate(self.start, self.end, np.array([self.duration]), shares)
-        p_TG[..., 2] += _hop_height(s, self.hop, self.rise)
+        p_TG[..., 2] += _retraction(s, self.retract, self.ramp_share)
         return np.asarray(p_TG[0])
 
 
@@ -123,7 +122,7 @@ class ToolPath(Protocol):
 
     @property
     def knots(self) -> FloatArray:
-        """Times from 0 to `duration` between which it is smooth throughout, s."""
+        """Times from 0 to `duration`, s; the path is smooth between them."""
 
     def p_TG(self, time: FloatArray) -> FloatArray:
         """Returns (n, 3) m, in T, at `time` (n,) s."""
@@ -147,7 +146,7 @@ class WallIk(FrozenValue):
         """Returns joint angles with the nozzle at points before the wall.
 
         Args:
-            p_TGs: (..., 3) m, in T; before a `surface`, places on it.
+            p_TGs: (..., 3) m, in T; with a `surface`, coordinates on it.
 
         Returns:
             (..., 5) rad, elbow up; NaN where the arm does not reach.
@@ -162,26 +161,26 @@ class WallIk(FrozenValue):
         return q.reshape((*np.shape(p_TGs)[:-1], 5))
 
     def place(self, p_WG: FloatArray) -> FloatArray:
-        """Returns where a nozzle (3,), m in W, is before the wall, as `solve` takes it.
+        """Returns a nozzle (3,), m in W, as `inverse_kinematics` takes it.
 
-        Near a `surface` this is its foot there and its distance; see
+        With a `surface` this is its foot there and its distance; see
         `SurfaceFrame.places`.
         """
         p_TG = np.asarray(self.X_WT.inverse() @ p_WG)
         return p_TG if self.surface is None else self.surface.places(p_TG[None])[0]
 
-    def keeps_rates(
+    def within_rates(
         self, p_TGs: FloatArray, v_TGs: FloatArray, limits: ArmLimits
     ) -> BoolArray:
-        """Tells where the joints can follow a nozzle that goes over the wall.
+        """Tells where the joints can follow a moving nozzle.
 
         Args:
-            p_TGs: (n, 3) m, as `solve` takes them.
+            p_TGs: (n, 3) m, as `inverse_kinematics` takes them.
             v_TGs: (n, 3) or (3,) m/s, rates of these.
             limits: Of the joints, as far as the plan may use them.
 
         Returns:
-            (n,) bool; False also where the arm does not reach.
+            (n,) bool; False also out of reach.
         """
         before, q, after = (
             self.inverse_kinematics(p_TGs + time * v_TGs)
@@ -189,19 +188,17 @@ class WallIk(FrozenValue):
         )
         v = (after - before) / (2.0 * _DIFFERENCE)
         a = (after - 2.0 * q + before) / _DIFFERENCE**2
-        with np.errstate(invalid="ignore"):
-            keeps = np.abs(v) <= SEARCH_SHARE * limits.v_max
-            keeps &= np.abs(a) <= SEARCH_SHARE * limits.a_max
+        within = _within_rates(v, a, limits)
         if limits.torques is not None:
             known = np.flatnonzero(np.isfinite(q).all(axis=1))
             torques = limits.torques(q[known], v[known], a[known])
-            keeps[known] &= np.abs(torques) <= limits.effort_max
-        return np.asarray(keeps.all(axis=1))
+            within[known] &= np.abs(torques) <= limits.effort_max
+        return np.asarray(within.all(axis=1))
 
     def joint_states(self, *nozzles: MovingState) -> list[MovingState]:
-        """Returns the joints' states for nozzles in T at constant velocities.
+        """Returns joint states for nozzles in T at constant velocities.
 
-        NaN where the arm does not reach. The rates are central differences.
+        NaN out of reach. The rates are central differences.
         """
         times = np.array([[-_DIFFERENCE], [0.0], [_DIFFERENCE]])
         places = np.array([nozzle.x + times * nozzle.v for nozzle in nozzles])
@@ -221,11 +218,11 @@ class ToolMove(FrozenValue):
 
     Attributes:
         path: The nozzle over time.
-        gun: Turns it into joint angles.
+        ik: Turns it into joint angles.
     """
 
     path: ToolPath
-    gun: WallIk
+    ik: WallIk
 
     @property
     def duration(self) -> float:
@@ -239,58 +236,60 @@ class ToolMove(FrozenValue):
 
     def q(self, time: FloatArray) -> FloatArray:
         """See `Segment.q`."""
-        return self.gun.inverse_kinematics(self.path.p_TG(time))
+        return self.ik.inverse_kinematics(self.path.p_TG(time))
 
 
 def fastest_tool_blend(
     start: MovingState,
     end: MovingState,
     *,
-    gun: WallIk,
+    ik: WallIk,
     limits: ArmLimits,
-    hop: float = 0.0,
-    rise: float = 0.5,
+    retract: float = 0.0,
+    ramp_share: float = 0.5,
     longest: float = math.inf,
-) -> ToolBlend | None:
+) -> ToolMove | None:
     """Finds the tool blend of shortest duration that the joints can follow.
 
     Args:
-        start: Nozzle in T at the start, at constant velocity.
-        end: Nozzle in T at the end, at constant velocity.
-        gun: Inverse kinematics.
+        start: State of the nozzle in T at the start, at constant velocity.
+        end: The same at the end.
+        ik: Inverse kinematics.
         limits: Of the joints, as far as the plan may use them.
-        hop: See `ToolBlend`.
-        rise: See `ToolBlend`.
+        retract: See `ToolBlend`.
+        ramp_share: See `ToolBlend`.
         longest: Only shorter blends are of use, s.
 
     Returns:
-        The blend, or None if no duration of use, up to 8 s, keeps reach and limits.
+        The blend as a move; None if no duration of use, up to 8 s, is within reach and
+        limits.
     """
-    few, heights = (_hop_height(samples.s, hop, rise) for samples in (_FEW, _SAMPLES))
 
-    def possible(durations: FloatArray) -> BoolArray:
-        return kept(durations, _FEW, few, every=3)
+    def quick_check(durations: FloatArray) -> BoolArray:
+        return kept(durations, _FEW, every=3)
 
-    def allowed(durations: FloatArray) -> BoolArray:
-        return kept(durations, _SAMPLES, heights, every=1)
+    def feasible(durations: FloatArray) -> BoolArray:
+        return kept(durations, _SAMPLES, every=1)
 
-    def kept(
-        durations: FloatArray, samples: Shares, heights: FloatArray, *, every: int
-    ) -> BoolArray:
-        """Looks at samples; at every third one if they come in threes."""
+    def kept(durations: FloatArray, samples: Shares, *, every: int) -> BoolArray:
+        """Checks the limits at samples; at every third one if they come in threes."""
         p_TGs, _ = evaluate(start, end, durations, samples)
-        p_TGs[..., 2] += heights
-        q = gun.inverse_kinematics(p_TGs)
+        p_TGs[..., 2] += _retraction(samples.s, retract, ramp_share)
+        q = ik.inverse_kinematics(p_TGs)
         before, at, after = (
             q[:, first : first + q.shape[1] - 2 : every] for first in range(3)
         )
         dt = (durations * _STEP)[:, None, None]
         v = (after - before) / (2.0 * dt)
         a = (after - 2.0 * at + before) / dt**2
-        with np.errstate(invalid="ignore"):
-            keeps = np.abs(v) <= SEARCH_SHARE * limits.v_max
-            keeps &= np.abs(a) <= SEARCH_SHARE * limits.a_max
-        return np.asarray(keeps.all(axis=(1, 2)) & limits.contains(q).all(axis=1))
+        within = _within_rates(v, a, limits).all(axis=(1, 2))
+        return np.asarray(within & limits.contains(q).all(axis=1))
+
+    def move(duration: float) -> ToolMove:
+        return ToolMove(ToolBlend(start, end, duration, retract, ramp_share), ik)
+
+    def verified(duration: float) -> bool:
+        return within_limits(move(duration).q, duration, limits)
 
     travel = float(np.linalg.norm(end.x - start.x))
     durations = np.geomspace(max(0.02, travel / _FASTEST), _LONGEST, 28)
@@ -298,22 +297,27 @@ def fastest_tool_blend(
     if speed > 0.0 and travel > 0.0:
         # Going straight on at constant speed needs no acceleration of the gun at all.
         durations = np.sort(np.append(durations, travel / speed))
-
-    def certain(duration: float) -> bool:
-        blend = ToolBlend(start, end, duration, hop, rise)
-        return within_limits(ToolMove(blend, gun).q, duration, limits)
-
-    duration = shortest(allowed, durations, certain, longest=longest, possible=possible)
-    return None if duration is None else ToolBlend(start, end, duration, hop, rise)
+    duration = shortest(
+        feasible, durations, verified, longest=longest, quick_check=quick_check
+    )
+    return None if duration is None else move(duration)
 
 
-def _hop_height(s: FloatArray, hop: float, rise: float) -> FloatArray:
-    """Returns the hop's height (n,), m, at shares `s` (n,): up, along, down again."""
-    if not hop:
+def _within_rates(v: FloatArray, a: FloatArray, limits: ArmLimits) -> BoolArray:
+    """Tells which joint rates (..., 5) and accelerations a search accepts."""
+    with np.errstate(invalid="ignore"):
+        within = np.abs(v) <= SEARCH_SHARE * limits.v_max
+        within &= np.abs(a) <= SEARCH_SHARE * limits.a_max
+    return np.asarray(within)
+
+
+def _retraction(s: FloatArray, retract: float, ramp_share: float) -> FloatArray:
+    """Returns how far the gun is retracted (n,), m, at shares `s` (n,)."""
+    if not retract:
         return np.zeros_like(s)
 
     def smooth_step(u: FloatArray) -> FloatArray:
         u = np.clip(u, 0.0, 1.0)
         return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
-    return hop * smooth_step(s / rise) * smooth_step((1.0 - s) / rise)
+    return retract * smooth_step(s / ramp_share) * smooth_step((1.0 - s) / ramp_share)

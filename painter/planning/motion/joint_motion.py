@@ -15,24 +15,24 @@ from painter.planning.spray_path import Motion
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
 _POSITION_MARGIN = 0.02  # rad, kept off a joint's end by plans.
-_SHORTEST_MOVE = 0.05  # s; a move of no length still lasts a few samples.
-# Share of the time in which a move speeds up, by which the acceleration rises, and
-# falls again: 0.1 s where a stretched arm starts off, so that drives can follow.
+_SHORTEST_MOVE = 0.05  # s; a move of zero length still lasts a few samples.
+# Share of the acceleration phase that each ramp of the acceleration takes: 0.1 s for an
+# outstretched arm, so that drives can follow.
 _TRAVEL_RAMP = 0.2
 _SHORTEST_CRUISE = 1e-6  # s; a shorter one is rounding.
 _DURATIONS = np.geomspace(_SHORTEST_MOVE, 8.0, 60)  # s, of blends, tried in turn.
-_SAMPLES = Shares.at(np.linspace(0.0, 1.0, 33))  # Where a blend's rates are looked at.
-# The peak between two samples may exceed what is seen at them a little.
+_SAMPLES = Shares.at(np.linspace(0.0, 1.0, 33))  # Where a blend's rates are sampled.
+# The peak between two samples may exceed theirs a little.
 SEARCH_SHARE = 0.98
-_DENSE_STEP = 0.004  # s, of the second look at a move that was found.
-_TORQUE_EVERY = 5  # Of these samples, one is looked at for torque.
-_SLOWER = 1.05  # By which a move is slowed that fails the second look,
+_DENSE_STEP = 0.004  # s, between the samples that verify a move.
+_TORQUE_EVERY = 5  # Of these samples, one is checked for torque.
+_SLOWER = 1.05  # Factor by which a move is slowed that fails verification,
 _SLOWER_STEPS = 30  # and how often.
-_AT_A_TIME = 6  # Durations that are looked at together.
+_AT_A_TIME = 6  # Durations evaluated together.
 
 
 class Segment(Protocol):
-    """A piece of motion; chained pieces meet with equal q, its rate and its second."""
+    """A piece of motion; chained pieces meet in position, velocity, acceleration."""
 
     @property
     def duration(self) -> float:
@@ -40,7 +40,7 @@ class Segment(Protocol):
 
     @property
     def knots(self) -> FloatArray:
-        """Times from 0 to `duration` between which it is smooth throughout, s."""
+        """Times from 0 to `duration`, s; the motion is smooth between them."""
 
     def q(self, time: FloatArray) -> FloatArray:
         """Returns (n, 5) rad at `time` (n,) s from the segment's own start."""
@@ -74,16 +74,16 @@ class JointBlend(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class JointTravel(FrozenValue):
-    """A `Segment` straight from rest to rest: it speeds up, cruises and slows down.
+    """A `Segment` straight from rest to rest: it accelerates, cruises and decelerates.
 
-    While it speeds up the acceleration rises to a plateau and falls again, linearly;
-    slowing down is the same backwards. All joints share one law of time.
+    The acceleration ramps up linearly to a plateau and down again; the deceleration
+    mirrors it. All joints share one time law.
 
     Attributes:
         q0: (5,) rad, at its start.
         q1: (5,) rad, at its end.
-        speed_up: How long it speeds up, and slows down again, s.
-        cruise: How long it goes at constant rates between, s; may be 0.
+        speed_up: Duration of the acceleration, and of the deceleration, s.
+        cruise: Duration at constant rates between, s; may be 0.
     """
 
     q0: FloatArray
@@ -102,36 +102,36 @@ class JointTravel(FrozenValue):
         ramp = _TRAVEL_RAMP
         begin = self.speed_up * np.array([0.0, ramp, 1.0 - ramp, 1.0])
         end = self.duration - begin[::-1]
-        # Without a cruise the first of the end is the last of the beginning.
+        # Without a cruise the two share a knot.
         return np.concatenate([begin, end[0 if self.cruise else 1 :]])
 
     def q(self, time: FloatArray) -> FloatArray:
         """See `Segment.q`."""
         t = np.clip(np.asarray(time, dtype=float), 0.0, self.duration)
         near_start = t <= 0.5 * self.duration
-        way = self._way(np.where(near_start, t, self.duration - t))
-        share = np.where(near_start, way, 1.0 - way)[:, None]
+        gone = self._share_gone(np.where(near_start, t, self.duration - t))
+        share = np.where(near_start, gone, 1.0 - gone)[:, None]
         return np.asarray((1.0 - share) * self.q0 + share * self.q1)
 
-    def _way(self, t: FloatArray) -> FloatArray:
-        """Returns the share of the way that is gone at `t`, in the first half, s."""
-        rise, ramp = self.speed_up, _TRAVEL_RAMP * self.speed_up
-        rate = 1.0 / (rise + self.cruise)
-        acceleration = rate / (rise - ramp)
+    def _share_gone(self, t: FloatArray) -> FloatArray:
+        """Returns the share of the travel covered at `t`, in the first half, s."""
+        speed_up, ramp = self.speed_up, _TRAVEL_RAMP * self.speed_up
+        rate = 1.0 / (speed_up + self.cruise)
+        acceleration = rate / (speed_up - ramp)
         rising = acceleration * t**3 / (6.0 * ramp)
         after = t - ramp
         steady = acceleration * (ramp**2 / 6.0 + after * (ramp + after) / 2.0)
-        rest = np.maximum(rise - t, 0.0)
-        falling = rate * (t - 0.5 * rise) + acceleration * rest**3 / (6.0 * ramp)
+        rest = np.maximum(speed_up - t, 0.0)
+        falling = rate * (t - 0.5 * speed_up) + acceleration * rest**3 / (6.0 * ramp)
         return np.where(t < ramp, rising, np.where(rest > ramp, steady, falling))
 
 
 @dataclass(frozen=True, eq=False)
-class Stand(FrozenValue):
-    """A `Segment` that stands still.
+class Dwell(FrozenValue):
+    """A `Segment` at rest.
 
     Attributes:
-        q0: (5,) rad, where.
+        q0: (5,) rad, the pose held.
         duration: s.
     """
 
@@ -175,7 +175,7 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
         limits: Of the joints, as far as the plan may use them.
     """
     move = least_travel(q0, q1, limits)
-    # What gravity alone takes cannot be saved by going slower.
+    # Going slower saves nothing of what gravity alone takes.
     for _ in range(_SLOWER_STEPS):
         if within_limits(move.q, move.duration, limits):
             break
@@ -184,12 +184,12 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
 
 
 def least_travel(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTravel:
-    """Makes the move that rates and accelerations of the joints alone allow.
+    """Makes the fastest move within the joints' rates and accelerations alone.
 
-    Torques and the nozzle's speed may want a slower one; see `rest_to_rest`.
+    Torques and the nozzle's speed may require a slower one; see `rest_to_rest`.
     """
     travel = np.abs(q1 - q0)
-    # Of the whole way, by the joint that allows least: 1/s and 1/s².
+    # Share of the travel, by the joint that allows least: 1/s and 1/s².
     with np.errstate(divide="ignore"):
         rate = SEARCH_SHARE * float(np.min(limits.v_max / travel))
         acceleration = SEARCH_SHARE * float(np.min(limits.a_max / travel))
@@ -204,7 +204,7 @@ def least_travel(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
 def fastest_joint_blend(
     start: MovingState, end: MovingState, limits: ArmLimits
 ) -> JointBlend | None:
-    """Finds the joint blend of shortest duration that keeps the limits.
+    """Finds the joint blend of shortest duration that is within the limits.
 
     Args:
         start: Joint state at the start.
@@ -212,47 +212,46 @@ def fastest_joint_blend(
         limits: Of the joints, as far as the plan may use them.
 
     Returns:
-        The blend, or None if no duration up to 8 s keeps them.
+        The blend, or None if no duration up to 8 s is within them.
     """
 
-    def possible(durations: FloatArray) -> BoolArray:
+    def quick_check(durations: FloatArray) -> BoolArray:
         first, second = plateaus(start, end, durations)
         peak = np.maximum(np.abs(first), np.abs(second))
         return np.asarray((peak <= SEARCH_SHARE * limits.a_max).all(axis=1))
 
-    def allowed(durations: FloatArray) -> BoolArray:
-        keeps = possible(durations)
-        if keeps.any():
-            q, v = evaluate(start, end, durations[keeps], _SAMPLES)
+    def feasible(durations: FloatArray) -> BoolArray:
+        within = quick_check(durations)
+        if within.any():
+            q, v = evaluate(start, end, durations[within], _SAMPLES)
             slow = (np.abs(v) <= SEARCH_SHARE * limits.v_max).all(axis=(1, 2))
-            keeps[keeps] = slow & limits.contains(q).all(axis=1)
-        return keeps
+            within[within] = slow & limits.contains(q).all(axis=1)
+        return within
 
-    def certain(duration: float) -> bool:
+    def verified(duration: float) -> bool:
         return within_limits(JointBlend(start, end, duration).q, duration, limits)
 
-    duration = shortest(allowed, _DURATIONS, certain, possible=possible)
+    duration = shortest(feasible, _DURATIONS, verified, quick_check=quick_check)
     return None if duration is None else JointBlend(start, end, duration)
 
 
 def within_limits(
-    place: Callable[[FloatArray], FloatArray], duration: float, limits: ArmLimits
+    position: Callable[[FloatArray], FloatArray], duration: float, limits: ArmLimits
 ) -> bool:
-    """Tells whether a move keeps its limits, looked at as densely as executed.
+    """Tells whether a move, sampled as densely as executed, is within its limits.
 
-    These are rates and torques of the joints and the speed of the nozzle.
-
-    A search over many durations looks at few samples of each, between which a peak may
-    hide; what it finds is looked at once more.
+    These are rates and torques of the joints and the speed of the nozzle. A search over
+    many durations takes few samples of each, between which a peak may hide; this
+    verifies what it finds.
 
     Args:
-        place: Joint angles (n, 5), rad, at times (n,), s.
+        position: Joint angles (n, 5), rad, at times (n,), s.
         duration: Of the move, s.
         limits: Of the joints, as far as the plan may use them.
     """
     count = max(9, int(np.ceil(duration / _DENSE_STEP)) + 1)
     time, step = np.linspace(0.0, duration, count, retstep=True)
-    q = place(time)
+    q = position(time)
     v = (q[2:] - q[:-2]) / (2.0 * step)
     a = (q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2
     with np.errstate(invalid="ignore"):
@@ -271,30 +270,30 @@ def within_limits(
 
 
 def shortest(
-    allowed: Callable[[FloatArray], BoolArray],
+    feasible: Callable[[FloatArray], BoolArray],
     durations: FloatArray,
-    certain: Callable[[float], bool] = lambda duration: True,
+    verified: Callable[[float], bool] = lambda duration: True,
     *,
     longest: float = math.inf,
-    possible: Callable[[FloatArray], BoolArray] | None = None,
+    quick_check: Callable[[FloatArray], BoolArray] | None = None,
 ) -> float | None:
-    """Finds the shortest duration that is allowed.
+    """Finds the shortest feasible duration.
 
-    Allowed durations need not be an interval (a slower turn swings out farther), so
-    a grid is tried, then the gap between the last one that fails and the first one
-    that does not, then longer ones until one passes the second look.
+    Feasible durations need not form an interval (a slower turn swings out farther), so
+    a grid is tried, then the gap between the last one that fails and the first one that
+    does not, then longer ones until one is verified.
 
     Args:
-        allowed: Tells of durations (k,), s, which are allowed, (k,) bool.
+        feasible: Tells which of durations (k,), s, are feasible, (k,) bool.
         durations: (n,) s, ascending grid.
-        certain: A slower and closer look at one duration that is allowed.
+        verified: A slower, denser check of one feasible duration.
         longest: Only shorter ones are of use, s.
-        possible: A quicker look, at the whole grid: what it rules out is not allowed.
+        quick_check: A quicker test of the whole grid: what it rejects is not feasible.
     """
-    # The first one that is of no use may still bound a gap in which others are.
+    # The first one that is too long may still bound a gap with shorter ones.
     durations = durations[: np.searchsorted(durations, longest) + 1]
-    able = durations if possible is None else durations[possible(durations)]
-    found = next(_in_turn(allowed, able), None)
+    promising = durations if quick_check is None else durations[quick_check(durations)]
+    found = next(_in_turn(feasible, promising), None)
     if found is None:
         return None
     first = int(np.searchsorted(durations, found))
@@ -303,18 +302,18 @@ def shortest(
     longer = found * _SLOWER ** np.arange(1, _SLOWER_STEPS)
     slower = np.unique(np.append(durations[first:], longer[longer < durations[-1]]))
     tries = itertools.chain.from_iterable(
-        _in_turn(allowed, some[some < longest]) for some in (between, slower)
+        _in_turn(feasible, some[some < longest]) for some in (between, slower)
     )
-    return next((duration for duration in tries if certain(duration)), None)
+    return next((duration for duration in tries if verified(duration)), None)
 
 
 def _in_turn(
-    allowed: Callable[[FloatArray], BoolArray], durations: FloatArray
+    feasible: Callable[[FloatArray], BoolArray], durations: FloatArray
 ) -> Iterator[float]:
-    """Yields those durations that are allowed, looking at some at a time."""
+    """Yields the feasible durations, evaluating a few at a time."""
     for first in range(0, len(durations), _AT_A_TIME):
         some = durations[first : first + _AT_A_TIME]
-        yield from some[allowed(some)].tolist()
+        yield from some[feasible(some)].tolist()
 
 
 def chain(
@@ -324,12 +323,12 @@ def chain(
     spray_on: FloatArray | None = None,
     flow: FloatArray | None = None,
 ) -> Motion:
-    """Samples segments one after the other and joins the samples twice smoothly.
+    """Samples segments one after the other and joins the samples by a spline.
 
-    The velocities are those of the clamped cubic spline through the samples, so that
-    the motion's cubic Hermite curve *is* that spline: continuous to the second
-    derivative, at rest at both ends. There is a sample at every knot: a spline across
-    a bend of the acceleration would swing beyond it.
+    The velocities are those of the clamped cubic spline through the samples, so the
+    motion's cubic Hermite curve *is* that spline: continuous to the second derivative,
+    at rest at both ends. Every knot is a sample: a spline across a bend of the
+    acceleration would overshoot it.
 
     Args:
         segments: At least one; the first starts and the last ends at rest.
@@ -341,12 +340,12 @@ def chain(
         The motion.
     """
     starts = start_times(segments)
-    times, places = [np.zeros(1)], [segments[0].q(np.zeros(1))]
+    times, positions = [np.zeros(1)], [segments[0].q(np.zeros(1))]
     for segment, start in zip(segments, starts, strict=False):
         local = _sample_times(segment.knots, period)
         times.append(start + local)
-        places.append(segment.q(local))
-    time, q = np.concatenate(times), np.concatenate(places)
+        positions.append(segment.q(local))
+    time, q = np.concatenate(times), np.concatenate(positions)
     v = CubicSpline(time, q, bc_type="clamped")(time, 1)
     v[[0, -1]] = 0.0
     spray = np.zeros((0, 2)) if spray_on is None else spray_on
@@ -363,6 +362,6 @@ def _sample_times(knots: FloatArray, period: float) -> FloatArray:
 
 
 def start_times(segments: Sequence[Segment]) -> FloatArray:
-    """Returns when each segment of a chain starts, and at last when it ends, s."""
+    """Returns when each segment of a chain starts, then when the chain ends, s."""
     durations = np.array([segment.duration for segment in segments])
     return np.concatenate([[0.0], np.cumsum(durations)])

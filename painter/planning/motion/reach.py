@@ -1,4 +1,4 @@
-"""Whether the arm reaches what it is asked for, and if not, by how much."""
+"""Whether the arm reaches given nozzle positions, and if not, by how much."""
 
 import math
 
@@ -9,7 +9,7 @@ from painter.planning.arm.kinematics import ArmLimits
 from painter.planning.motion.gun_path import WallIk
 from perception.ground import FloatArray
 
-_REACH_STEP = 0.05  # m, between the places at which reach is asked for ...
+_REACH_STEP = 0.05  # m, between the points at which reach is sampled ...
 _STANDOFF_STEP = 0.015  # m, ... and between the stand-offs.
 _JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
@@ -35,7 +35,7 @@ def nearest_standoffs(
     x: FloatArray,
     y: FloatArray,
     *,
-    gun: WallIk,
+    ik: WallIk,
     limits: ArmLimits,
     near: float,
     far: float,
@@ -43,29 +43,29 @@ def nearest_standoffs(
 ) -> FloatArray:
     """Returns the least stand-offs from which strokes along T y can be sprayed.
 
-    The nearer the nozzle, the farther the arm has to stretch in a tile's corners. A
-    stroke may end wherever it may be: there must be room to stop beyond.
+    The nearer the nozzle, the farther the arm has to stretch to a tile's corners. A
+    stroke may end anywhere, so the arm must also reach the overtravel beyond.
 
     Args:
         x: (nx,) m in T, ascending.
         y: (ny,) m in T, ascending.
-        gun: Inverse kinematics.
+        ik: Inverse kinematics.
         limits: Of the joints.
-        near: Least stand-off that is asked for, m.
-        far: Of the raster, m; whether the arm reaches that is asked elsewhere.
-        stopping: In which the gun stops beyond a stroke's end, m.
+        near: Least stand-off to consider, m.
+        far: Stand-off of the raster, m; its reach is checked elsewhere.
+        stopping: Distance in which the gun stops beyond a stroke's end, m.
 
     Returns:
         (ny, nx) m, `near` to `far`.
     """
     columns, rows = (_spread(axis, _REACH_STEP) for axis in (x, y))
     standoffs = np.linspace(near, far, max(2, round((far - near) / _STANDOFF_STEP) + 1))
-    # Away from the middle is where reach ends.
+    # Reach ends away from the middle.
     beyond = rows + stopping * np.sign(rows - rows.mean())
     places = np.meshgrid(standoffs, beyond, columns, indexing="ij")
     p_TGs = np.stack([place.ravel() for place in places[::-1]], axis=-1)
-    reached = limits.contains(gun.inverse_kinematics(p_TGs)).reshape(places[0].shape)
-    # Out of reach up to the last stand-off at which it is.
+    reached = limits.contains(ik.inverse_kinematics(p_TGs)).reshape(places[0].shape)
+    # The first stand-off beyond the last one out of reach.
     first = np.where(reached, 0, np.arange(1, standoffs.size + 1)[:, None, None])
     coarse = standoffs[np.minimum(first.max(axis=0), standoffs.size - 1)]
     by_row = np.array([np.interp(x, columns, row) for row in coarse])
@@ -73,36 +73,36 @@ def nearest_standoffs(
 
 
 def _spread(axis: FloatArray, step: float) -> FloatArray:
-    """Returns evenly spaced places from one end of an axis to the other."""
+    """Returns evenly spaced points from one end of an axis to the other."""
     count = max(2, math.ceil((axis[-1] - axis[0]) / step) + 1)
     return np.linspace(axis[0], axis[-1], count)
 
 
 def require_reach(
-    p_TGs: FloatArray, *, gun: WallIk, limits: ArmLimits, what: str
+    p_TGs: FloatArray, *, ik: WallIk, limits: ArmLimits, what: str
 ) -> FloatArray:
     """Solves for joint angles and raises if a point is out of reach.
 
     Args:
         p_TGs: (n, 3) m, nozzle positions in T.
-        gun: Inverse kinematics.
+        ik: Inverse kinematics.
         limits: Of the joints.
-        what: What the points belong to, for the message.
+        what: Name of the points, for messages.
 
     Returns:
         (n, 5) rad.
 
     Raises:
-        ReachError: Tells which share is out of reach, the worst point and its figures.
+        ReachError: Names the share out of reach, the worst point and its figures.
     """
-    q = gun.inverse_kinematics(p_TGs)
+    q = ik.inverse_kinematics(p_TGs)
     bad = ~limits.contains(q)
     if not bad.any():
         return q
-    arm = gun.kinematics
-    needed = wrist_distances(p_TGs, gun)
+    arm = ik.kinematics
+    needed = wrist_distances(p_TGs, ik)
     longest = arm.upper_arm + arm.forearm
-    share = f"{what}: {100 * bad.mean():.0f} % of it is out of reach"
+    share = f"{what}: {100 * bad.mean():.0f} % is out of reach"
     worst = int(np.argmax(np.where(bad, needed, -np.inf)))
     x, y, z = p_TGs[worst]
     place = f"T ({x:.2f}, {y:.2f}) m, {z:.2f} m before the wall"
@@ -130,13 +130,13 @@ def require_reach(
     )
 
 
-def wrist_distances(p_TGs: FloatArray, gun: WallIk) -> FloatArray:
+def wrist_distances(p_TGs: FloatArray, ik: WallIk) -> FloatArray:
     """Returns the shoulder-to-wrist distance (n,), m, that nozzle points (n, 3) need.
 
     With the gun square to the wall L's axes in T are x = -z, y = -x, z = y.
     """
-    ahead, left, above = gun.kinematics.X_LG.translation()
+    ahead, left, above = ik.kinematics.X_LG.translation()
     p_TLs = p_TGs - np.array([-left, above, -ahead])
-    p_WLs = (gun.X_WT @ p_TLs.T).T
-    p_WS = np.array([0.0, 0.0, gun.kinematics.shoulder_height])
+    p_WLs = (ik.X_WT @ p_TLs.T).T
+    p_WS = np.array([0.0, 0.0, ik.kinematics.shoulder_height])
     return np.asarray(np.linalg.norm(p_WLs - p_WS, axis=1))

@@ -1,8 +1,8 @@
 """The wall's own surface as the gun follows it: heights and normals, smooth in T.
 
-Places before the wall are given as (x, y, distance): the foot (x, y) on the surface,
-and how far before it along its normal there. On a flat wall these are T's own x, y and
-z, so whatever is planned in them for a flat wall holds for one that is not.
+A surface coordinate is (x, y, distance): the foot (x, y) on the surface and the
+distance from it along the normal there. On a flat wall these are T's own x, y and z, so
+a plan in them for a flat wall holds for any other.
 """
 
 import functools
@@ -16,14 +16,16 @@ from painter.planning.tile import cell_centres
 from perception.ground import FloatArray, FrozenValue
 from perception.values import WallSegmentation
 
-# Flatter walls are sprayed as planes: the gun is as near to right as it is asked to be.
+# Flatter walls are sprayed as planes: the error is within the strokes' tolerances.
 _FLAT_HEIGHT = 0.005  # m
 _FLAT_DEG = 1.0
-# m, standard deviation of the Gaussian that smooths heights: 0.09 m wide at half its
-# height. The gun turns over an edge so gently, and ripples do not shake it.
+# m, standard deviation of the Gaussian that smooths heights (0.09 m wide at half its
+# height), so that the gun turns gently over an edge and ripples do not shake it.
 _SMOOTHING = 0.04
 _KNOTS = 0.02  # m, between the spline's.
-_BORDER = 0.5  # m beyond the tile to which the surface goes on as it was at the edge.
+_BORDER = (
+    0.5  # m beyond the tile; the surface continues there with its slope at the edge.
+)
 _DEGREE = 5  # Its normals, and with them the joints, have continuous accelerations.
 _ROUNDS = 60  # Of the search for a foot; each takes at least a quarter off the error.
 
@@ -44,9 +46,7 @@ class SurfaceFrame(FrozenValue):
 
     @classmethod
     def of_wall(cls, segmentation: WallSegmentation) -> "SurfaceFrame | None":
-        """Makes the surface that the gun is to follow on a wall.
-
-        Asked for the same wall again it returns the same surface.
+        """Makes the surface that the gun follows on a wall; cached for the last wall.
 
         Args:
             segmentation: Of the tile.
@@ -61,8 +61,8 @@ class SurfaceFrame(FrozenValue):
     def smoothed(cls, height: FloatArray, cell: float) -> "SurfaceFrame":
         """Makes a surface of heights (ny, nx), m, at the centres of a tile's cells."""
         border = int(np.ceil(_BORDER / cell))
-        fringe = int(np.ceil(4.0 * _SMOOTHING / cell))  # What is smoothed off.
-        # Point reflection at an edge goes on with the slope there.
+        fringe = int(np.ceil(4.0 * _SMOOTHING / cell))  # Cut off after smoothing.
+        # Point reflection at an edge continues the slope there.
         wide = np.pad(height, border + fringe, mode="reflect", reflect_type="odd")
         step = max(1, round(_KNOTS / cell))
         smooth: FloatArray = gaussian_filter(wide, _SMOOTHING / cell)
@@ -74,10 +74,10 @@ class SurfaceFrame(FrozenValue):
         return cls(x=x, y=y, height=smooth[::step, ::step])
 
     def heights(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Returns heights (n,), m along T z, at places (n,), m in T."""
+        """Returns heights (n,), m along T z, at points (n,), m in T."""
         inside_x, inside_y = self._within(x, y)
         height = self._spline.ev(inside_y, inside_x)
-        # Farther out it is a plane.
+        # Farther out the surface is a plane.
         slope_x, slope_y = self._slopes(inside_x, inside_y)
         return np.asarray(
             height + slope_x * (x - inside_x) + slope_y * (y - inside_y), dtype=float
@@ -90,17 +90,17 @@ class SurfaceFrame(FrozenValue):
         return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True))
 
     def points(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Returns points and normals in T, (n, 3) each, of places (n, 3), m."""
+        """Returns points and normals in T, (n, 3) each, of coordinates (n, 3), m."""
         x, y, distance = places.T
         normals = self.normals(x, y)
         feet = np.column_stack([x, y, self.heights(x, y)])
         return feet + distance[:, None] * normals, normals
 
     def places(self, p_TQs: FloatArray) -> FloatArray:
-        """Returns the places (n, 3), m, of points (n, 3), m in T; inverts `points`.
+        """Returns the coordinates (n, 3), m, of points (n, 3), m in T.
 
-        A point so far before a hollow that normals cross there has no one place; what
-        is returned for it is one of them, or none.
+        Inverts `points`. Where normals cross, far before a hollow, a point has no
+        unique coordinates; the result is then one of them, or none.
         """
         places = np.array(p_TQs, dtype=np.float64)
         for _ in range(_ROUNDS):
@@ -144,7 +144,7 @@ def _surface_of(segmentation: WallSegmentation) -> SurfaceFrame | None:
 
 
 def above_wall(segmentation: WallSegmentation) -> FloatArray:
-    """Returns what was seen (ny, nx), m before the surface that the gun follows."""
+    """Returns the depth seen (ny, nx), m before the surface that the gun follows."""
     depth = np.asarray(segmentation.depth, dtype=np.float64)
     frame = SurfaceFrame.of_wall(segmentation)
     if frame is None:

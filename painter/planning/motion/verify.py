@@ -1,4 +1,4 @@
-"""A dense second look at a finished motion: what is executed, not how it was made."""
+"""A dense check of a finished motion, independent of how it was planned."""
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -13,15 +13,15 @@ from perception.ground import FloatArray, IntArray
 _STEP = 0.002  # s, of the resampled motion.
 _SPEED_TOLERANCE = 0.02  # Share of the stroke's speed.
 _STANDOFF_TOLERANCE = 0.002  # m
-_PLACE_TOLERANCE = 0.002  # m, nozzle from the stroke's line and ends.
+_PLACE_TOLERANCE = 0.002  # m, nozzle off the stroke's line and ends.
 _ANGLE_TOLERANCE_DEG = 0.5  # Spray axis from the wall's normal.
-_POSITION_TOLERANCE = 1e-3  # rad; a measured start may lie a hair outside.
-# Share of the planned limits: the spline through the samples swings a little beyond
-# what was planned between them.
+_POSITION_TOLERANCE = 1e-3  # rad; a measured start may lie slightly outside.
+# Share of the planned limits: the spline through the samples overshoots the plan a
+# little between them.
 _RATE_TOLERANCE = 1.05
 _CLEARANCE_TOLERANCE = 0.001  # m
-_TORQUE_STEP = 0.02  # s, of the samples looked at for torque.
-_CLEARANCE_STEP = 0.03  # m, of the arm between two looks at its clearance.
+_TORQUE_STEP = 0.02  # s, between the samples checked for torque.
+_CLEARANCE_STEP = 0.03  # m of arm travel between clearance checks.
 _JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
 
@@ -42,12 +42,12 @@ def verify_motion(
         limits: Of the joints and the nozzle.
         limit_share: Share of their velocities, accelerations and torques that plans
             may use.
-        space: What must be kept clear of.
+        space: What the arm keeps clear of.
         what: Name of the motion, for messages.
 
     Raises:
         MotionLimitError: A joint leaves its position, velocity, acceleration or torque
-            limit, or the nozzle its speed; names joint, time, value and bound.
+            limit, or the nozzle exceeds its speed; names joint, time, value and bound.
         CollisionError: The arm comes nearer than its clearance; names bodies and time.
     """
     share = limit_share * _RATE_TOLERANCE
@@ -66,16 +66,15 @@ def verify_motion(
         bounds = share * limits.effort_max
         _require_within(f"{what}: torque", "N m", time[few], torques, bounds)
     if limits.nozzle is not None:
-        # Between neighbouring samples: what lies between them is no faster but by the
-        # tolerance.
+        # Between neighbouring samples; the tolerance covers what lies in between.
         gaps = np.linalg.norm(np.diff(limits.nozzle(motion.q), axis=0), axis=1)
         speed = gaps / np.diff(motion.time)
         bound = share * limits.nozzle_speed
         _require_within(f"{what}: nozzle speed", "m/s", motion.time, speed, bound)
-    # Plans look at other samples than these.
-    seen = _spread(motion.q, kinematics)
+    # Plans check other samples than these.
+    sampled = _spread(motion.q, kinematics)
     space.require(
-        motion.q[seen], motion.time[seen], what=what, slack=_CLEARANCE_TOLERANCE
+        motion.q[sampled], motion.time[sampled], what=what, slack=_CLEARANCE_TOLERANCE
     )
 
 
@@ -86,7 +85,7 @@ def verify_strokes(
     valve_delay: float,
     surface: SurfaceFrame | None = None,
 ) -> None:
-    """Checks gun speed, stand-off, angle and place while the paint flows.
+    """Checks gun speed, stand-off, angle and position while the paint flows.
 
     Stand-off and angle are against the wall's surface; the speed is that of the
     nozzle's foot there, along T.
@@ -128,21 +127,21 @@ def verify_strokes(
         cosine = -axis_T[:, 2]
     else:
         places = np.column_stack([ideal, standoff])
-        wanted, normals = surface.points(places)
+        ideal_TGs, normals = surface.points(places)
         cosine = -np.sum(axis_T * normals, axis=1)
-        off = p_TG - wanted
+        off = p_TG - ideal_TGs
         before = np.sum(off * normals, axis=1)
         p_TG = places + off - before[:, None] * normals
         p_TG[:, 2] = standoff + before
     off_axis_deg = np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    # The last place of a stroke has no next one; it counts with the one before.
+    # The last sample of a stroke has no next one; it counts with the one before.
     nexts = np.arange(1, len(time) + 1)
     nexts[lasts] = lasts
     gaps = p_TG[nexts, :2] - p_TG[nexts - 1, :2]
     speed = np.linalg.norm(gaps, axis=1) / (time[nexts] - time[nexts - 1])
     lengths = speeds * np.diff(opened, axis=1)[:, 0]
     reached = np.abs(starts + along * lengths[:, None] - ends).max(axis=1)
-    looks: list[tuple[str, str, FloatArray, FloatArray | float]] = [
+    checks: list[tuple[str, str, FloatArray, FloatArray | float]] = [
         (
             "speed error",
             "m/s",
@@ -151,14 +150,14 @@ def verify_strokes(
         ),
         ("stand-off error", "m", p_TG[:, 2] - standoff, _STANDOFF_TOLERANCE),
         ("gun angle", "deg", off_axis_deg, _ANGLE_TOLERANCE_DEG),
-        ("place across x", "m", p_TG[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
-        ("place along y", "m", p_TG[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
+        ("position across x", "m", p_TG[:, 0] - ideal[:, 0], _PLACE_TOLERANCE),
+        ("position along y", "m", p_TG[:, 1] - ideal[:, 1], _PLACE_TOLERANCE),
         ("end", "m", reached[number], _PLACE_TOLERANCE),
     ]
-    within = [np.abs(values) <= bounds for _, _, values, bounds in looks]
+    within = [np.abs(values) <= bounds for _, _, values, bounds in checks]
     for wrong in np.unique(number[~np.all(within, axis=0)]):
         rows = number == wrong
-        for name, unit, values, bounds in looks:
+        for name, unit, values, bounds in checks:
             some = np.broadcast_to(bounds, values.shape)[rows]
             what = f"stroke {wrong + 1}: {name}"
             _require_within(what, unit, time[rows], values[rows], some)
@@ -169,16 +168,16 @@ def _extremes(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Returns times (n,) and positions, rates and accelerations (n, 5) there.
 
-    Between two samples the acceleration of a cubic is a straight line: it is greatest
-    at either end, and the rate there or where the acceleration crosses zero. So
-    nothing lies between these places. Each joint crosses zero at a time of its own;
-    the rows for it carry that joint's rate, and the time of the sample before.
+    Between two samples the acceleration of a cubic is linear: it is greatest at either
+    end, and the rate is greatest there or where the acceleration crosses zero. Each
+    joint crosses zero at its own time; these rows hold that joint's rate, and the time
+    of the sample before.
     """
     h = np.diff(motion.time)[:, None]
-    rise = np.diff(motion.q, axis=0) / h
+    slope_q = np.diff(motion.q, axis=0) / h
     v0, v1 = motion.v[:-1], motion.v[1:]
-    a0 = (6.0 * rise - 4.0 * v0 - 2.0 * v1) / h
-    a1 = (-6.0 * rise + 2.0 * v0 + 4.0 * v1) / h
+    a0 = (6.0 * slope_q - 4.0 * v0 - 2.0 * v1) / h
+    a1 = (-6.0 * slope_q + 2.0 * v0 + 4.0 * v1) / h
     slope = a1 - a0
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = np.where(a0 * a1 < 0.0, -a0 / slope, 0.0)
@@ -203,7 +202,7 @@ def _gun_in_tile(
 
 
 def _spread(q: FloatArray, kinematics: ArmKinematics) -> IntArray:
-    """Returns the rows of q (n, 5) that are looked at, ends among them."""
+    """Returns the rows of q (n, 5) to check, both ends among them."""
     travel = np.cumsum(kinematics.travel(q))
     _, first = np.unique(np.floor(travel / _CLEARANCE_STEP), return_index=True)
     return np.unique(np.concatenate([[0], first + 1, [len(q) - 1]]))
@@ -230,6 +229,6 @@ def _require_within(
     joint = f" of {_JOINTS[worst[1]]}" if size.shape[1:] == (5,) else ""
     raise MotionLimitError(
         f"{what}{joint} is {size[worst]:.4g} {unit} at {time[worst[0]]:.3f} s, "
-        f"allowed is {bounds[worst]:.4g} {unit}.",
+        f"the limit is {bounds[worst]:.4g} {unit}.",
         code="PNT-MOTION-004",
     )

@@ -44,7 +44,7 @@ def clear_strokes(
     """
     if not strokes:
         return [], []
-    if transitions.gun.surface is not None:
+    if transitions.ik.surface is not None:
         strokes = [_slowed(stroke, transitions) for stroke in strokes]
     shares = [_shares(stroke) for stroke in strokes]
     counts = [share.size for share in shares]
@@ -58,19 +58,19 @@ def clear_strokes(
             for stroke, share in zip(strokes, shares, strict=True)
         ]
     )
-    q = transitions.gun.inverse_kinematics(p_TGs)
+    q = transitions.ik.inverse_kinematics(p_TGs)
     reached = transitions.limits.contains(q)
     total = sum(stroke.length for stroke in strokes)
     first_time = np.repeat([stroke.kind != "touch_up" for stroke in strokes], counts)
     missed = np.count_nonzero(first_time & ~reached) * _STEP
     if missed > _MOST_OUT_OF_REACH * total or not reached.any():
         require_reach(
-            p_TGs, gun=transitions.gun, limits=transitions.limits, what="strokes"
+            p_TGs, ik=transitions.ik, limits=transitions.limits, what="strokes"
         )
     free = np.array(reached)
     free[reached] = transitions.space.free(q[reached])
     turns = np.ones(len(q), dtype=bool)
-    if transitions.gun.surface is not None:
+    if transitions.ik.surface is not None:
         turns = np.concatenate(
             [_keeps_rates(stroke, transitions) for stroke in strokes]
         )
@@ -111,7 +111,7 @@ def has_run_out(strokes: Sequence[Stroke], transitions: TransitionPlanner) -> Bo
             for beyond, out in RUN_OUT
         ]
     )
-    q = transitions.gun.inverse_kinematics(p_TGs)
+    q = transitions.ik.inverse_kinematics(p_TGs)
     free = transitions.limits.contains(q)
     free[free] = transitions.space.free(q[free])
     return np.asarray(free.reshape(len(strokes), -1).all(axis=1))
@@ -143,7 +143,7 @@ def _keeps_rates(stroke: Stroke, transitions: TransitionPlanner) -> BoolArray:
         stroke.start_T + np.outer(_shares(stroke), travel), stroke.standoff
     )
     v_TG = np.append(travel * (stroke.speed / stroke.length), 0.0)
-    return transitions.gun.keeps_rates(p_TGs, v_TG, transitions.limits)
+    return transitions.ik.within_rates(p_TGs, v_TG, transitions.limits)
 
 
 def nozzle_points(p_T: FloatArray, standoff: float) -> FloatArray:

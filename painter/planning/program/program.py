@@ -117,7 +117,7 @@ class ProgramPlanner(FrozenValue):
             MotionLimitError: The finished motion fails its verification.
         """
         motion, limits = self.motion, self.limits
-        gun = self._gun(segmentation)
+        ik = self._gun(segmentation)
         space = ClearSpace(
             self.checker,
             X_WT=segmentation.X_WT,
@@ -126,7 +126,7 @@ class ProgramPlanner(FrozenValue):
             floor_clearance=motion.floor_clearance,
         )
         transitions = TransitionPlanner(
-            gun=gun,
+            ik=ik,
             limits=planning_limits(limits, motion.limit_share),
             space=space,
             q_home=np.deg2rad(motion.home_deg),
@@ -164,7 +164,7 @@ class ProgramPlanner(FrozenValue):
             program,
             kinematics=self.kinematics,
             valve_delay=self.tip.valve_delay,
-            surface=gun.surface,
+            surface=ik.surface,
         )
         return program
 
@@ -182,7 +182,7 @@ class ProgramPlanner(FrozenValue):
         reached = nearest_standoffs(
             x,
             y,
-            gun=self._gun(segmentation),
+            ik=self._gun(segmentation),
             limits=self.limits,
             near=self.raster.cut_in_standoff,
             far=self.raster.standoff,

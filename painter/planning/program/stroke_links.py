@@ -12,7 +12,7 @@ import numpy as np
 from painter.errors import CollisionError, ReachError
 from painter.planning.motion.blend import MovingState
 from painter.planning.motion.gun_path import Pass, ToolMove
-from painter.planning.motion.joint_motion import Segment, Stand
+from painter.planning.motion.joint_motion import Dwell, Segment
 from painter.planning.motion.transitions import TransitionPlanner, end_q
 from painter.planning.program.clear_strokes import has_run_out, nozzle_points
 from painter.planning.spray_path import SkippedStroke, Stroke
@@ -55,13 +55,13 @@ def connect_strokes(
     done: list[Stroke] = []
     passes: list[int] = []
     skipped: list[SkippedStroke] = []
-    gun, q = transitions.gun, q0
+    ik, q = transitions.ik, q0
     for coat in sorted({stroke.coat for stroke in strokes}) or [1]:
         if path and flash_off > 0.0:
-            path.append(Stand(q, flash_off))
+            path.append(Dwell(q, flash_off))
         rests = [
-            gun.place(p_WG)
-            for p_WG in gun.kinematics.nozzle(np.stack([q, transitions.q_home]))
+            ik.place(p_WG)
+            for p_WG in ik.kinematics.nozzle(np.stack([q, transitions.q_home]))
         ]
         of_coat = [stroke for stroke in strokes if stroke.coat == coat]
         ordered = order_strokes(of_coat, *rests)
@@ -110,7 +110,7 @@ def _linked(
     for fit in fits:
         skipped += fit.skipped
         if fit.stroke is not None:
-            path += [*fit.link, ToolMove(_pass(fit.stroke), transitions.gun)]
+            path += [*fit.link, ToolMove(_pass(fit.stroke), transitions.ik)]
             passes.append(len(path) - 1)
             sprayed.append(fit.stroke)
     if strokes and not sprayed:

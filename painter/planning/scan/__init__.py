@@ -1,4 +1,4 @@
 """Motions of the camera: first look, zig-zag scan, more looks, and the way home.
 
-The top of planning beside `program`.
+With `program` the top of planning; neither imports the other.
 """

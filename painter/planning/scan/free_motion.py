@@ -1,4 +1,4 @@
-"""Gun-off motions of the cycle: home, first sight, scan, retract."""
+"""Gun-off motions of the cycle: home, first look, scan, retract."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,21 +25,21 @@ from painter.planning.scan.more_looks import more_looks
 from painter.planning.scan.scan_path import look_segments, scan_segments
 from painter.planning.spray_path import Motion
 from perception.fine_steps.shadows import Relief
-from perception.ground import FloatArray, FrozenValue
+from perception.ground import FloatArray
 
 GOALS = ("home", "look", "scan", "retract")
 
 
 @dataclass(frozen=True, eq=False)
-class FreeMotionPlanner(FrozenValue):
+class FreeMotionPlanner:
     """Plans motions with the gun closed for one robot with one set of settings.
 
     Attributes:
         kinematics: Of the arm.
         limits: Of its joints.
         checker: Of the robot's cell: arm, frame and floor.
-        tile: Size of the tile, and where the job expects it.
-        scan: Settings of first sight, scan and more looks.
+        tile: Size of the tile and its expected pose.
+        scan: Settings of first look, scan and more looks.
         motion: Settings of the motion.
         standoff: Of the gun when it paints, m.
     """
@@ -56,14 +56,13 @@ class FreeMotionPlanner(FrozenValue):
         """Plans a motion of the cycle.
 
         Until the wall has been scanned the arm keeps `motion.wall_keepout` and the
-        clearance from it. "look" and "scan" first make sure that the whole tile can be
-        painted from where the arm stands, so that a job that cannot be done ends at
-        once.
+        clearance from it. "look" and "scan" first check that the gun reaches the whole
+        tile, so that a job that cannot be done ends at once.
 
         Args:
             goal: "home" or "retract": to the home pose; "look": over two quarters of
                 the tile; "scan": along rows over the tile.
-            q0: (5,) rad, where the arm stands, at rest.
+            q0: (5,) rad, start, at rest.
             X_WT: Tile frame T in W, as expected or as found.
 
         Returns:
@@ -72,7 +71,7 @@ class FreeMotionPlanner(FrozenValue):
         Raises:
             ValueError: There is no such goal.
             ReachError: The tile, or the wall, is out of the arm's reach.
-            CollisionError: There is no clear way.
+            CollisionError: There is no clear route.
             MotionLimitError: The finished motion fails its verification.
         """
         if goal not in GOALS:
@@ -81,12 +80,11 @@ class FreeMotionPlanner(FrozenValue):
         if goal in ("look", "scan"):
             points = tile_points(tile.width, tile.height, self.standoff)
             what = f"tile of {tile.width:.2f} x {tile.height:.2f} m"
-            gun = WallIk(self.kinematics, X_WT)
-            require_reach(points, gun=gun, limits=self.limits, what=what)
-        # After painting, or once stopped half way, the gun may stand within the
-        # keepout.
+            ik = WallIk(self.kinematics, X_WT)
+            require_reach(points, ik=ik, limits=self.limits, what=what)
+        # After painting or a stop the gun may be within the keepout.
         keepouts = (0.0,) if goal == "retract" else (self.motion.wall_keepout, 0.0)
-        transitions = self._linker(q0, X_WT, keepouts)
+        transitions = self._transition_planner(q0, X_WT, keepouts)
         path: Sequence[Segment]
         if goal == "scan":
             path = scan_segments(q0, tile, self.scan, transitions)
@@ -99,19 +97,19 @@ class FreeMotionPlanner(FrozenValue):
     def more_looks(
         self, q0: FloatArray, relief: Relief, X_WT: RigidTransform
     ) -> Motion | None:
-        """Plans looks at wall that the scan has left in shadow.
+        """Plans looks at wall that the scan left in shadow.
 
-        The arm keeps the clearance from the highest thing that the scan has found, and
-        no less from the wall than in the scan.
+        The arm keeps the clearance from the highest object that the scan found, and at
+        least as much from the wall as in the scan.
 
         Args:
-            q0: (5,) rad, where the arm stands, at rest.
+            q0: (5,) rad, start, at rest.
             relief: What the scan has found.
             X_WT: Tile frame T in W, as found.
 
         Returns:
-            The motion, verified; None if nothing is worth a look, or the arm stands
-            nearer to the wall than what was found on it is high.
+            The motion, verified; None if nothing is worth a look, or if the arm is
+            nearer to the wall than the highest object on it.
 
         Raises:
             MotionLimitError: The finished motion fails its verification.
@@ -121,7 +119,7 @@ class FreeMotionPlanner(FrozenValue):
             return None
         keepout = max(self.motion.wall_keepout, float(relief.height.max()))
         try:
-            transitions = self._linker(q0, X_WT, (keepout,))
+            transitions = self._transition_planner(q0, X_WT, (keepout,))
         except CollisionError:
             return None
         path = more_looks(q0, relief, self.scan, transitions)
@@ -129,10 +127,10 @@ class FreeMotionPlanner(FrozenValue):
             return None
         return self._verified(path, transitions.space, what="motion 'more looks'")
 
-    def _linker(
+    def _transition_planner(
         self, q0: FloatArray, X_WT: RigidTransform, keepouts: Sequence[float]
     ) -> TransitionPlanner:
-        """Returns a planner with the largest keep-out that the arm is outside of."""
+        """Returns a planner with the largest keep-out that excludes the arm."""
         motion = self.motion
         for keepout in keepouts:
             space = ClearSpace(
@@ -144,20 +142,20 @@ class FreeMotionPlanner(FrozenValue):
             )
             if space.all_free(q0[None]):
                 return TransitionPlanner(
-                    gun=WallIk(self.kinematics, X_WT),
+                    ik=WallIk(self.kinematics, X_WT),
                     limits=planning_limits(self.limits, motion.limit_share),
                     space=space,
                     q_home=np.deg2rad(motion.home_deg),
                 )
         raise CollisionError(
-            f"the arm stands where it may not: {space.worst_pair(q0)}.",
+            f"the arm starts in collision: {space.worst_pair(q0)}.",
             code="PNT-SCAN-001",
         )
 
     def _verified(
         self, path: Sequence[Segment], space: ClearSpace, *, what: str
     ) -> Motion:
-        """Chains the segments and looks at the outcome once more."""
+        """Chains the segments and verifies the result."""
         planned = chain(path, period=self.motion.sample_period)
         verify_motion(
             planned,

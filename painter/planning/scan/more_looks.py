@@ -14,7 +14,7 @@ import numpy as np
 
 from painter.errors import CollisionError
 from painter.planning.config import ScanConfig
-from painter.planning.motion.joint_motion import Segment, Stand, rest_to_rest
+from painter.planning.motion.joint_motion import Dwell, Segment, rest_to_rest
 from painter.planning.motion.transitions import TransitionPlanner, end_q
 from painter.planning.scan.scan_path import (
     BASELINE,
@@ -56,7 +56,7 @@ def more_looks(
             path += transitions.free_motion(at, q)
         except CollisionError:
             continue
-        path.append(Stand(q, scan.more_look_time))
+        path.append(Dwell(q, scan.more_look_time))
     return path
 
 
@@ -89,9 +89,9 @@ def look_poses(
         shown &= seen_from(
             p_TCs + [eye, 0.0, 0.0], p_TQs, relief.height, cell=relief.cell
         )
-    p_TGs = nozzle_under_camera(p_TCs, transitions.gun)
+    p_TGs = nozzle_under_camera(p_TCs, transitions.ik)
     shown &= reachable_and_clear(p_TGs, transitions)[:, None]
-    q = transitions.gun.inverse_kinematics(p_TGs)
+    q = transitions.ik.inverse_kinematics(p_TGs)
     chosen: list[FloatArray] = []
     for _ in range(scan.more_looks):
         gain = shown.sum(axis=1)

@@ -55,12 +55,12 @@ def view_at(distance: float) -> View:
     return View(half_width - BASELINE, half_width, half_height)
 
 
-def nozzle_under_camera(p_TCs: FloatArray, gun: WallIk) -> FloatArray:
+def nozzle_under_camera(p_TCs: FloatArray, ik: WallIk) -> FloatArray:
     """Returns where the nozzle is with the square camera at p_TCs (n, 3), m, in T.
 
     With the tool square to the wall L's axes in T are x = -z, y = -x, z = y.
     """
-    arm = gun.kinematics
+    arm = ik.kinematics
     ahead, left, above = arm.X_LG.translation() - arm.X_LC.translation()
     return np.asarray(p_TCs + np.array([-left, above, -ahead]))
 
@@ -122,7 +122,7 @@ def look_poses(
     ticks = _LOOK_SPREAD * np.linspace(-1.0, 1.0, _LOOK_TICKS)
     x, y = np.meshgrid(centre_T[0] + ticks, centre_T[1] + ticks)
     p_TCs = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, scan.look_distance)])
-    p_TGs = nozzle_under_camera(p_TCs, transitions.gun)
+    p_TGs = nozzle_under_camera(p_TCs, transitions.ik)
     good = reachable_and_clear(p_TGs, transitions)
     if not good.any():
         raise ReachError(
@@ -131,7 +131,7 @@ def look_poses(
             f"{centre_T[1]:.2f}) m.",
             code="PNT-SCAN-002",
         )
-    return transitions.gun.inverse_kinematics(p_TGs[good])
+    return transitions.ik.inverse_kinematics(p_TGs[good])
 
 
 def scan_rows(
@@ -183,7 +183,7 @@ def _rows_at_distance(
     for height in heights:
         x0, x1 = (left, right) if rightwards else (right, left)
         p_TCs = np.array([[x0, height, scan.distance], [x1, height, scan.distance]])
-        p_TGs = nozzle_under_camera(p_TCs, transitions.gun)
+        p_TGs = nozzle_under_camera(p_TCs, transitions.ik)
         row = Pass.between(p_TGs[0], p_TGs[1], scan.speed)
         rows.append(_slowed(row, transitions))
         rightwards = not rightwards
@@ -204,7 +204,7 @@ def scan_segments(
     for index, row in enumerate(rows):
         if index > 0:
             path += transitions.connect(rows[index - 1].end, row.start)
-        path.append(ToolMove(row, transitions.gun))
+        path.append(ToolMove(row, transitions.ik))
     path.append(transitions.to_rest(rows[-1].end))
     return path
 
@@ -248,9 +248,9 @@ def _row_heights(
             points = _row_points(x, limit, scan, transitions)
             what = f"scan row {tile.bottom + limit:.2f} m over the floor"
             require_reach(
-                points, gun=transitions.gun, limits=transitions.limits, what=what
+                points, ik=transitions.ik, limits=transitions.limits, what=what
             )
-            q = transitions.gun.inverse_kinematics(points)
+            q = transitions.ik.inverse_kinematics(points)
             transitions.space.require(q, np.zeros(len(q)), what=what)
         else:
             heights.append(found)
@@ -264,7 +264,7 @@ def _slowed(row: Pass, transitions: TransitionPlanner) -> Pass:
     """
     count = int(row.duration * np.linalg.norm(row.v_TG) / _POINT_STEP) + 5
     time = np.linspace(0.0, row.duration, count)
-    v = np.gradient(transitions.gun.inverse_kinematics(row.p_TG(time)), time, axis=0)
+    v = np.gradient(transitions.ik.inverse_kinematics(row.p_TG(time)), time, axis=0)
     a = np.gradient(v, time, axis=0)
     limits = transitions.limits
     slower = max(
@@ -282,14 +282,14 @@ def _row_points(
     p_TCs = np.column_stack(
         [x, np.full(x.size, height), np.full(x.size, scan.distance)]
     )
-    return nozzle_under_camera(p_TCs, transitions.gun)
+    return nozzle_under_camera(p_TCs, transitions.ik)
 
 
 def reachable_and_clear(
     p_TGs: FloatArray, transitions: TransitionPlanner
 ) -> np.ndarray:
     """Returns (n,) bool: at which nozzle places (n, 3) the arm keeps clear."""
-    q = transitions.gun.inverse_kinematics(p_TGs)
+    q = transitions.ik.inverse_kinematics(p_TGs)
     good = transitions.limits.contains(q)
     good[good] = transitions.space.free(q[good])
     return np.asarray(good)

@@ -51,12 +51,12 @@ def test_clearance_from_a_box_is_the_one_asked_for(robot, gap, free):
     # The nozzle is the foremost point of the arm: 0.3 m before the wall.
     box = ObstacleBox("box", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.1, 0.3 - gap]))
     transitions = robot.transitions(box)
-    q = transitions.gun.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
+    q = transitions.ik.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
     assert transitions.space.free(q).tolist() == [free]
 
 
 def test_boxes_of_one_wall_do_not_stay_for_the_next(robot):
-    q = robot.transitions().gun.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
+    q = robot.transitions().ik.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
     box = ObstacleBox("box", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.1, 0.35]))
     assert not robot.transitions(box).space.all_free(q)
     assert robot.transitions().space.all_free(q)
@@ -70,7 +70,7 @@ def test_collision_names_motion_time_and_bodies(robot):
         clearance=0.04,
         floor_clearance=0.01,
     )
-    q = robot.transitions().gun.inverse_kinematics(
+    q = robot.transitions().ik.inverse_kinematics(
         np.array([[1.0, 1.0, 0.6], [1.0, 1.0, 0.3]])
     )
     with pytest.raises(CollisionError, match=r"test: gun and surroundings.* 2\.50 s"):
@@ -89,7 +89,7 @@ def test_one_blocked_place_among_many_is_found_wherever_it_is(robot, where):
     transitions = robot.transitions(post)
     heights = np.full(41, 0.5)
     heights[where] = 0.3
-    q = transitions.gun.inverse_kinematics(np.column_stack([np.ones(41), y, heights]))
+    q = transitions.ik.inverse_kinematics(np.column_stack([np.ones(41), y, heights]))
     time = np.linspace(0.0, 4.0, 41)
     others = np.arange(41) != where
     assert transitions.space.all_free(q[others])

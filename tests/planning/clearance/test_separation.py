@@ -53,7 +53,7 @@ def test_nothing_that_drake_finds_blocked_is_proven(robot, tilt):
 def test_gun_before_the_wall_is_proven_clear_nearly_everywhere(robot):
     x, y = np.meshgrid(np.linspace(0.1, 1.9, 19), np.linspace(0.1, 1.9, 19))
     places = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.3)])
-    q = robot.transitions().gun.inverse_kinematics(places)
+    q = robot.transitions().ik.inverse_kinematics(places)
     wall = (Box(4.0, 4.0, 0.1), X_WT @ RigidTransform([1.0, 1.0, -0.05]))
     checker = checker_with(robot, wall)
     assert free(checker, q).all()
@@ -65,7 +65,7 @@ def test_gun_before_the_wall_is_proven_clear_nearly_everywhere(robot):
 @pytest.mark.parametrize(("clearance", "proven"), [(0.0495, True), (0.0505, False)])
 def test_bound_is_the_gap_before_the_nozzle(robot, clearance, proven):
     """A box 5 cm before a gun that is square to its face."""
-    q = robot.transitions().gun.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
+    q = robot.transitions().ik.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
     box = (Box(0.2, 0.2, 0.1), X_WT @ RigidTransform([1.0, 1.0, 0.2]))
     separation = SeparatingAxisPrefilter(checker_with(robot, box), X_WT)
     assert separation.surely_clear(q, clearance).tolist() == [proven]

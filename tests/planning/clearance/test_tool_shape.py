@@ -27,9 +27,9 @@ def least_standoffs(robot, *run_out):
 
 
 def free(robot, x, y, standoff):
-    gun = WallIk(robot.kinematics, nominal_tile_pose(TileConfig()))
+    ik = WallIk(robot.kinematics, nominal_tile_pose(TileConfig()))
     places = np.stack(np.broadcast_arrays(*np.atleast_1d(x, y, standoff)), axis=-1)
-    return robot.transitions(BOX).space.free(gun.inverse_kinematics(places))
+    return robot.transitions(BOX).space.free(ik.inverse_kinematics(places))
 
 
 def test_gun_and_camera_keep_clear_from_there_on_and_not_from_nearer(robot):

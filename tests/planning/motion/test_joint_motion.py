@@ -84,17 +84,17 @@ def test_shortest_refines_between_grid_points():
 
 @pytest.mark.parametrize("longest", [0.4, 1.03, 1.2, 1.69, 1.7, 1.9, 5.0])
 def test_a_bound_on_what_is_of_use_changes_nothing_below_it(longest):
-    """The second look fails just below 1.6, so that slower ones are tried as well."""
+    """Verification fails just below 1.6, so that slower ones are tried as well."""
     grid = np.array([0.5, 1.0, 1.7, 2.0])
     search = (lambda t: t >= 1.05, grid, lambda t: t > 1.61)
     unbound = shortest(*search)
     asked = []
 
-    def certain(t):
+    def verified(t):
         asked.append(t)
         return t > 1.61
 
-    found = shortest(search[0], grid, certain, longest=longest)
+    found = shortest(search[0], grid, verified, longest=longest)
     assert found == (unbound if unbound < longest else None)
     assert all(t < longest for t in asked)
 

@@ -12,9 +12,9 @@ RUN_OUT = 0.10  # m beyond a stroke's end.
 
 
 def test_strokes_start_farther_off_where_the_arm_would_have_to_stretch(robot):
-    gun = WallIk(robot.kinematics, nominal_tile_pose(TileConfig()))
+    ik = WallIk(robot.kinematics, nominal_tile_pose(TileConfig()))
     dut = nearest_standoffs(
-        X, X, gun=gun, limits=robot.limits, near=0.06, far=0.315, stopping=0.10
+        X, X, ik=ik, limits=robot.limits, near=0.06, far=0.315, stopping=0.10
     )
     assert dut.shape == (41, 41)
     # In the middle the arm is bent; in the corners it cannot come near.
@@ -26,7 +26,7 @@ def test_strokes_start_farther_off_where_the_arm_would_have_to_stretch(robot):
 
     def needed(standoff):
         places = np.stack([xs, beyond, np.broadcast_to(standoff, xs.shape)], axis=-1)
-        return wrist_distances(places.reshape(-1, 3), gun).reshape(xs.shape)
+        return wrist_distances(places.reshape(-1, 3), ik).reshape(xs.shape)
 
     # One step of the stand-offs that are tried, 15 mm, is what it may be off.
     reached = dut < 0.315

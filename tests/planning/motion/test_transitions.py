@@ -1,4 +1,4 @@
-"""Moves between strokes: over what stands in the way, or round it."""
+"""Moves between strokes go over an obstacle or round it."""
 
 import itertools
 
@@ -24,11 +24,11 @@ TALL = ObstacleBox("tall", np.array([0.9, 0.9, 0.0]), np.array([1.1, 1.0, 0.32])
 def nozzle(transitions, segment):
     """Places of the nozzle in T along a segment, (n, 3) m."""
     q = segment.q(np.linspace(0.0, segment.duration, 400))
-    _, p_WGs = transitions.gun.kinematics.gun_poses(q)
-    return (transitions.gun.X_WT.inverse() @ p_WGs.T).T
+    _, p_WGs = transitions.ik.kinematics.gun_poses(q)
+    return (transitions.ik.X_WT.inverse() @ p_WGs.T).T
 
 
-def test_hop_clears_a_tall_box_between_two_strokes(robot):
+def test_retract_clears_a_tall_box_between_two_strokes(robot):
     transitions = robot.transitions(TALL)
     start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
     end = MovingState.steady(np.array([1.0, 1.25, 0.3]), UP)
@@ -41,7 +41,7 @@ def test_hop_clears_a_tall_box_between_two_strokes(robot):
     np.testing.assert_allclose(places[[0, -1]], [start.x, end.x], atol=1e-9)
 
 
-def test_nothing_in_the_way_needs_no_hop(robot):
+def test_nothing_in_the_way_needs_no_retract(robot):
     transitions = robot.transitions()
     start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
     end = MovingState.steady(np.array([1.0, 1.25, 0.3]), UP)
@@ -69,8 +69,8 @@ def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
     moves = transitions.connect(start, end)
     assert len(moves) == 1
     (turn,) = moves
-    np.testing.assert_allclose(start_q(turn), transitions.gun.joint_states(start)[0].x)
-    np.testing.assert_allclose(end_q(turn), transitions.gun.joint_states(end)[0].x)
+    np.testing.assert_allclose(start_q(turn), transitions.ik.joint_states(start)[0].x)
+    np.testing.assert_allclose(end_q(turn), transitions.ik.joint_states(end)[0].x)
     # The gun is square all along the turn: pitches and yaws add up to zero.
     q = turn.q(np.linspace(0.0, turn.duration, 100))
     np.testing.assert_allclose(q[:, 1:4].sum(axis=1), 0.0, atol=1e-6)
@@ -79,41 +79,43 @@ def test_turns_beyond_the_tile_meet_both_strokes(robot, x, y, sign):
 
 @pytest.mark.parametrize("box", [None, TALL])
 def test_the_quickest_clear_move_is_taken(robot, box):
-    """All that are tried, each found by itself, in the order of their durations."""
+    """Finds every candidate by itself and compares durations."""
     transitions = robot.transitions(*([] if box is None else [box]))
-    hops = [0.0] if box is None else [0.0, 0.10]
+    retracts = [0.0] if box is None else [0.0, 0.10]
     ways = ((0.87, -1.0), (1.0, 1.0), (1.07, 1.0), (1.16, -1.0))
     for x, way in ways if box is None else ((1.0, 1.0), (1.05, 1.0)):
         start = MovingState.steady(np.array([1.0, 0.65, 0.3]), UP)
         end = MovingState.steady(np.array([x, 1.25, 0.3]), way * UP)
-        by_hop = []
-        for hop in hops:
+        by_retract = []
+        for retract in retracts:
             blends = [
                 fastest_tool_blend(
                     start,
                     end,
-                    gun=transitions.gun,
+                    ik=transitions.ik,
                     limits=transitions.limits,
-                    hop=hop,
-                    rise=rise,
+                    retract=retract,
+                    ramp_share=ramp_share,
                 )
-                for rise in ((0.5, 0.35, 0.25, 0.15) if hop else (0.5,))
+                for ramp_share in ((0.5, 0.35, 0.25, 0.15) if retract else (0.5,))
             ]
-            moves = [ToolMove(blend, transitions.gun) for blend in blends if blend]
-            if not hop:
-                states = transitions.gun.joint_states(start, end)
+            moves = [blend for blend in blends if blend]
+            if not retract:
+                states = transitions.ik.joint_states(start, end)
                 moves.append(fastest_joint_blend(*states, transitions.limits))
-            by_hop.append([move.duration for move in moves if transitions.clear(move)])
-        durations = next(durations for durations in by_hop if durations)
+            by_retract.append(
+                [move.duration for move in moves if transitions.clear(move)]
+            )
+        durations = next(durations for durations in by_retract if durations)
         for _ in range(2):  # Asked again it is the same.
             (move,) = transitions.connect(start, end)
             assert move.duration == min(durations)
 
 
-def test_transit_goes_round_what_blocks_the_straight_way(robot):
+def test_free_motion_goes_round_what_blocks_the_straight_way(robot):
     wall = ObstacleBox("rib", np.array([0.95, 0.0, 0.0]), np.array([1.05, 2.0, 0.40]))
     transitions = robot.transitions(wall)
-    q0, q1 = transitions.gun.inverse_kinematics(
+    q0, q1 = transitions.ik.inverse_kinematics(
         np.array([[0.5, 1.0, 0.3], [1.5, 1.0, 0.3]])
     )
     legs = transitions.free_motion(q0, q1)
@@ -125,14 +127,14 @@ def test_transit_goes_round_what_blocks_the_straight_way(robot):
 
 @pytest.mark.parametrize("height", [0.0, 0.12, 0.3, 0.40])
 @pytest.mark.parametrize("y", [-0.1, 0.4, 1.0, 1.9])
-def test_transit_is_the_quickest_of_all_clear_ways(robot, height, y):
+def test_free_motion_is_the_quickest_of_all_clear_ways(robot, height, y):
     wall = ObstacleBox("rib", np.array([0.95, 0.0, 0.0]), np.array([1.05, 2.0, height]))
     transitions = robot.transitions(wall)
-    q0, q1 = transitions.gun.inverse_kinematics(
+    q0, q1 = transitions.ik.inverse_kinematics(
         np.array([[0.5, y, 0.18], [1.5, y, 0.3]])
     )
-    fold, unfold = (transitions._folded(float(q[0])) for q in (q0, q1))
-    back, forth = (transitions._retreat(q) for q in (q0, q1))
+    fold, unfold = (transitions.folded(float(q[0])) for q in (q0, q1))
+    back, forth = (transitions.retreat(q) for q in (q0, q1))
     ways = [
         [
             rest_to_rest(a, b, transitions.limits)
@@ -160,7 +162,7 @@ def test_transit_is_the_quickest_of_all_clear_ways(robot, height, y):
     assert all(transitions.clear(leg) for leg in found)
     duration = sum(leg.duration for leg in found)
     if isinstance(found[0], ToolMove):
-        # Over a hop it goes where the straight way is not clear, if that is quicker.
+        # A retract, where the direct move is not clear, if that is quicker.
         assert not transitions.clear(ways[0][0])
         assert duration < min(durations)
     else:
@@ -182,7 +184,7 @@ def test_gun_is_drawn_back_a_little_where_the_joints_straight_way_grazes(robot):
     """Low before the wall the arm swings through a chord's arc, a few mm into it."""
     transitions = robot.transitions()
     ends = np.array([[0.15, -0.10, 0.18], [1.13, -0.10, 0.15]])
-    q0, q1 = transitions.gun.inverse_kinematics(ends)
+    q0, q1 = transitions.ik.inverse_kinematics(ends)
     assert not transitions.clear(rest_to_rest(q0, q1, transitions.limits))
     (move,) = transitions.free_motion(q0, q1)
     assert transitions.clear(move)
@@ -194,6 +196,6 @@ def test_gun_is_drawn_back_a_little_where_the_joints_straight_way_grazes(robot):
 
 def test_no_way_out_of_a_collision(robot):
     transitions = robot.transitions(TALL)
-    (inside,) = transitions.gun.inverse_kinematics(np.array([[1.0, 0.95, 0.3]]))
-    with pytest.raises(CollisionError, match="transit: .* at 0.00 s"):
+    (inside,) = transitions.ik.inverse_kinematics(np.array([[1.0, 0.95, 0.3]]))
+    with pytest.raises(CollisionError, match="free motion: .* at 0.00 s"):
         transitions.free_motion(inside, transitions.q_home)

@@ -42,7 +42,7 @@ def test_motion_is_quick_sprays_nothing_and_keeps_off_the_wall(robot, goal, long
 
 @pytest.mark.parametrize("place", [(0.1, 0.05), (1.9, 1.95), (1.0, 1.0)])
 def test_retract_leads_home_from_before_the_wall(robot, place):
-    (q0,) = robot.transitions().gun.inverse_kinematics(np.array([[*place, 0.3]]))
+    (q0,) = robot.transitions().ik.inverse_kinematics(np.array([[*place, 0.3]]))
     motion = plan(robot, "retract", q0)
     np.testing.assert_allclose(motion.q[[0, -1]], [q0, HOME], atol=1e-9)
 
@@ -60,8 +60,8 @@ def test_tile_larger_than_reach_ends_the_job_at_first_sight(robot):
 
 
 def test_arm_inside_the_wall_is_a_collision(robot):
-    (q0,) = robot.transitions().gun.inverse_kinematics(np.array([[1.0, 1.0, 0.01]]))
-    with pytest.raises(CollisionError, match="stands where it may not: gun"):
+    (q0,) = robot.transitions().ik.inverse_kinematics(np.array([[1.0, 1.0, 0.01]]))
+    with pytest.raises(CollisionError, match="starts in collision: gun"):
         plan(robot, "retract", q0)
 
 

@@ -34,7 +34,7 @@ OVER = ((0.9, 1.1, 1.7, 1.8), (0.9, 1.1, 1.8, 1.86))
 @pytest.mark.parametrize("beside", [LEFT, RIGHT, UNDER, OVER])
 def test_one_look_shows_all_wall_beside_a_box_to_both_imagers(robot, beside):
     transitions = robot.transitions()
-    (q0,) = transitions.gun.inverse_kinematics(END_T)
+    (q0,) = transitions.ik.inverse_kinematics(END_T)
     q = look_poses(q0, make_relief(beside), SCAN, transitions)
     assert len(q) == 1
     R_WC, p_WC = robot.kinematics.camera_poses(q)
@@ -60,7 +60,7 @@ def test_one_look_shows_all_wall_beside_a_box_to_both_imagers(robot, beside):
 
 def test_two_shadows_that_no_place_shows_together_take_two_looks(robot):
     transitions = robot.transitions()
-    (q0,) = transitions.gun.inverse_kinematics(END_T)
+    (q0,) = transitions.ik.inverse_kinematics(END_T)
     relief = make_relief(LEFT, RIGHT)
     assert len(look_poses(q0, relief, SCAN, transitions)) == 2
     path = more_looks(q0, relief, SCAN, transitions)
@@ -75,7 +75,7 @@ def test_two_shadows_that_no_place_shows_together_take_two_looks(robot):
 
 def test_there_are_no_looks_for_nothing(robot):
     transitions = robot.transitions()
-    (q0,) = transitions.gun.inverse_kinematics(END_T)
+    (q0,) = transitions.ik.inverse_kinematics(END_T)
     assert more_looks(q0, make_relief(), SCAN, transitions) == []
     tiny = (LEFT[0], (0.18, 0.2, 1.0, 1.02))  # 4 cm²
     assert more_looks(q0, make_relief(tiny), SCAN, transitions) == []
@@ -85,7 +85,7 @@ def test_there_are_no_looks_for_nothing(robot):
 
 def test_the_arm_keeps_clear_of_what_the_scan_has_found(robot):
     tile = TileConfig()
-    (q0,) = robot.transitions().gun.inverse_kinematics(END_T)
+    (q0,) = robot.transitions().ik.inverse_kinematics(END_T)
     X_WT = nominal_tile_pose(tile)
     dut = FreeMotionPlanner(**vars(robot), tile=tile, scan=SCAN, motion=MotionConfig())
     motion = dut.more_looks(q0, make_relief(LEFT, UNDER), X_WT)

@@ -21,12 +21,12 @@ HALF_HEIGHT = 0.7 * np.tan(np.deg2rad(29.0))
 
 def camera_ends(robot, transitions, row):
     """Camera in T at both ends of a row, (2, 3) m."""
-    q = transitions.gun.inverse_kinematics(np.stack([row.start.x, row.end.x]))
+    q = transitions.ik.inverse_kinematics(np.stack([row.start.x, row.end.x]))
     R_WCs, p_WCs = robot.kinematics.camera_poses(q)
     np.testing.assert_allclose(
-        R_WCs[:, :, 2], [-transitions.gun.X_WT.rotation().col(2)] * 2, atol=1e-9
+        R_WCs[:, :, 2], [-transitions.ik.X_WT.rotation().col(2)] * 2, atol=1e-9
     )
-    return (transitions.gun.X_WT.inverse() @ p_WCs.T).T
+    return (transitions.ik.X_WT.inverse() @ p_WCs.T).T
 
 
 def test_rows_cover_tile_and_margin_with_the_overlap(robot):
@@ -55,7 +55,7 @@ def test_looks_keep_their_distance_and_are_near_the_place_asked_for(robot):
     transitions = robot.transitions()
     q = look_poses(np.array([1.0, 1.0]), SCAN, transitions)
     _, p_WCs = robot.kinematics.camera_poses(q)
-    p_TCs = (transitions.gun.X_WT.inverse() @ p_WCs.T).T
+    p_TCs = (transitions.ik.X_WT.inverse() @ p_WCs.T).T
     np.testing.assert_allclose(p_TCs[:, 2], SCAN.look_distance)
     assert np.abs(p_TCs[:, :2] - 1.0).max() <= 0.3 + 1e-9
 
@@ -69,7 +69,7 @@ def test_first_sight_is_quick_and_sees_two_quarters_across(robot):
         [segment.q(np.array([segment.duration]))[0] for segment in segments]
     )
     _, p_WCs = robot.kinematics.camera_poses(stops)
-    p_TCs = (transitions.gun.X_WT.inverse() @ p_WCs.T).T
+    p_TCs = (transitions.ik.X_WT.inverse() @ p_WCs.T).T
     # Near the quarters' middles: two looks close to one another may both miss the wall.
     low_right = np.abs(p_TCs[:, :2] - [1.5, 0.5]).max(axis=1) <= 0.15
     assert low_right.any()
@@ -87,15 +87,15 @@ def test_reach_of_a_tile_too_high_names_the_worst_corner(robot):
     transitions = robot.transitions()
     points = tile_points(2.0, 3.0, 0.3)
     with pytest.raises(ReachError, match=r"tall: \d+ % .* T \([02]\.00, 3\.00\) m"):
-        require_reach(points, gun=transitions.gun, limits=robot.limits, what="tall")
+        require_reach(points, ik=transitions.ik, limits=robot.limits, what="tall")
 
 
 def test_wrist_distance_is_that_of_forward_kinematics(robot):
     transitions = robot.transitions()
     p_TGs = np.array([[0.2, 0.3, 0.3], [1.6, 1.9, 0.5]])
-    _, p_WLs = robot.kinematics.forward(transitions.gun.inverse_kinematics(p_TGs))
+    _, p_WLs = robot.kinematics.forward(transitions.ik.inverse_kinematics(p_TGs))
     shoulder = np.array([0.0, 0.0, robot.kinematics.shoulder_height])
     np.testing.assert_allclose(
-        wrist_distances(p_TGs, transitions.gun),
+        wrist_distances(p_TGs, transitions.ik),
         np.linalg.norm(p_WLs - shoulder, axis=1),
     )

@@ -82,8 +82,8 @@ def test_more_looks_go_to_what_the_map_lacks_beside_a_box(planner):
     box = (abs(x - 0.3) < 0.1) & (abs(y - 1.0) < 0.1)
     shadow = (x > 0.13) & (x < 0.2) & (abs(y - 1.0) < 0.1)
     X_WT = nominal_tile_pose(TileConfig())
-    gun = WallIk(GetArmKinematics(MakeArmPlant(DIRECTIVES)), X_WT)
-    (q,) = gun.inverse_kinematics(np.array([[1.4, 0.4, 0.5]]))
+    ik = WallIk(GetArmKinematics(MakeArmPlant(DIRECTIVES)), X_WT)
+    (q,) = ik.inverse_kinematics(np.array([[1.4, 0.4, 0.5]]))
     ends = []
     for gap in (shadow, np.zeros_like(shadow)):
         p_TQs = np.stack([x, y, np.where(box, 0.1, 0.0)])[:, ~gap]
@@ -92,7 +92,7 @@ def test_more_looks_go_to_what_the_map_lacks_beside_a_box(planner):
         ends.append(result.value)
     assert ends[1] is None
     # The camera comes to the box's left: W y grows to the left from the tile's middle.
-    _, p_WCs = gun.kinematics.camera_poses(ends[0].q[-1:])
+    _, p_WCs = ik.kinematics.camera_poses(ends[0].q[-1:])
     assert p_WCs[0, 1] > 1.0 - 0.2
 
 
