@@ -205,6 +205,7 @@ ROOMS: dict[str, set[str]] = {
         "painter.errors",
         "painter.planning",
         "painter.resources",
+        "painter.scene",
     },
     "painter.systems": SYSTEM_VALUES
     | {"painter.errors", "painter.planning", "perception.errors"},
@@ -218,7 +219,12 @@ ROOMS: dict[str, set[str]] = {
         "perception.depth_camera",
     },
     "painter.systems.hardware": SYSTEM_VALUES
-    | {"painter.camera", "painter.canopen", "painter.errors"},
+    | {
+        "painter.camera",
+        "painter.canopen",
+        "painter.errors",
+        "painter.planning.arm.kinematics",
+    },
     "painter.diagrams": {
         "painter.camera",
         "painter.canopen.process",

@@ -19,9 +19,10 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 from scipy.special import betainc
 
-from benchmarks.findings.edges import CELL, COVERED, SOILED, TIP, edges_of
+from benchmarks.findings.edges import CELL, TIP, edges_of
 from painter.planning.config import RasterConfig
 from painter.planning.film.deposition import half_axes
+from painter.planning.film.figures import COVERED, OVERSPRAYED
 from painter.scene.load import load_scene
 from painter.scene.surface import height_field, is_paintable
 from perception.ground import FloatArray
@@ -144,7 +145,8 @@ def least_variance(
     )
     covered = wall[round(bare / STEP) :]
     clean = beyond[round(soiled / STEP) :]
-    for rows, low, high in ((covered, COVERED, np.inf), (clean, -np.inf, SOILED)):
+    bounds_of = ((covered, COVERED, np.inf), (clean, -np.inf, OVERSPRAYED))
+    for rows, low, high in bounds_of:
         if len(rows):
             bounds = (np.full(len(rows), bound) for bound in (low, high))
             programme.AddLinearConstraint(rows, *bounds, exposure)

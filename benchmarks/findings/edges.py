@@ -25,6 +25,7 @@ import numpy as np
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.film import film_cost
 from painter.planning.film.deposition import half_axes
+from painter.planning.film.figures import COVERED, OVERSPRAYED, FilmFigures
 from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.strokes.raster import plan_strokes, raster_film
 from painter.scene.load import load_scene
@@ -33,7 +34,6 @@ from perception.ground import BoolArray, FloatArray
 
 CELL = 0.01
 TIP = TipConfig()
-COVERED, SOILED = 0.8, 0.1
 STANDOFFS = (0.30, 0.20, 0.10, 0.08, 0.06)  # m, of the strokes beside edges.
 FLOWS = (1.0, 1.25, 1.5)  # Peak of such a stroke's film, as share of nominal.
 # Of soiled cells: half of the planner's own weight, that, and twice as much.
@@ -89,12 +89,12 @@ def main() -> None:
     for standoff in STANDOFFS[2:]:
         rows = [planned(mask, height, standoff, weight) for weight in WEIGHTS]
         for weight, row_of in zip(WEIGHTS, rows, strict=True):
-            covered, dirty, spilt, cv = row_of
             print(
-                f"{standoff:9.2f} {weight:7.1f} {covered:8.3f} {100 * dirty:6.1f} % "
-                f"{100 * spilt:7.1f} % {100 * cv:5.1f} %"
+                f"{standoff:9.2f} {weight:7.1f} {row_of.coverage:8.3f} "
+                f"{100 * row_of.keepout_paint:6.1f} % {100 * row_of.overspray:7.1f} % "
+                f"{100 * row_of.thickness_cv:5.1f} %"
             )
-        points = np.array(rows)
+        points = np.array([(row.coverage, row.keepout_paint) for row in rows])
         name = f"planned, {100 * standoff:.0f} cm"
         axes.plot(points[:, 0], 100 * points[:, 1], "o--", label=name)
     if arguments.scene in ASKED:
@@ -140,12 +140,12 @@ def theory(edges: Edges, standoff: float, flow: float) -> tuple[FloatArray, Floa
         core = 1.0 - min(film / flow, 1.0) ** (1.0 / TIP.gamma)
         return float(np.sqrt(max(core, 0.0)))
 
-    covers, soils = a * reach(COVERED), a * reach(SOILED * spread)
+    covers, soils = a * reach(COVERED), a * reach(OVERSPRAYED * spread)
     # A stroke's end: of the flow a share 1/2 + 3/4 s - 1/4 s³ has passed (beta2 = 2).
     s = np.linspace(-1.0, 1.0, 4001)
     passed = 0.5 + 0.75 * s - 0.25 * s**3
     end_covers = b * float(np.interp(COVERED, passed, s))
-    end_soils = -b * float(np.interp(min(SOILED * spread, 0.5), passed, s))
+    end_soils = -b * float(np.interp(min(OVERSPRAYED * spread, 0.5), passed, s))
 
     shift = np.linspace(0.0, 0.08, 641)  # m, strokes towards what stays clean.
     bare = np.maximum(soils - covers - shift, 0.0)
@@ -158,8 +158,8 @@ def theory(edges: Edges, standoff: float, flow: float) -> tuple[FloatArray, Floa
 
 def planned(
     mask: BoolArray, height: FloatArray, standoff: float, weight: float
-) -> tuple[float, float, float, float]:
-    """Returns coverage, soiled share, overspray and CV of the planner's strokes."""
+) -> FilmFigures:
+    """Returns the figures of the planner's strokes."""
     raster = RasterConfig(cut_in_standoff=standoff)
     weights = film_cost._OPENINGS._replace(soiled=weight)
     with mock.patch.object(film_cost, "_OPENINGS", weights):
@@ -167,13 +167,7 @@ def planned(
     nominal = raster_film(mask.shape[1] * CELL, tip=TIP, raster=raster)
     site = Site.of_tile(mask, CELL, height)
     film = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal).film(strokes)
-    on, off = film[site.wanted], film[site.clean]
-    return (
-        float(np.mean(on >= COVERED)),
-        float(np.mean(off >= SOILED)),
-        float(1.0 - on.sum() / film.sum()),
-        float(on.std() / on.mean()),
-    )
+    return FilmFigures.of(film[site.wanted], film[site.clean], film.sum())
 
 
 if __name__ == "__main__":

@@ -15,12 +15,12 @@ from pydrake.math import RigidTransform
 
 from benchmarks.support.scanned_scenes import scan_and_segment
 from painter.config import Scenario, load_scenario
+from painter.planning.film.figures import FilmFigures
 from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
-from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
+from painter.planning.tile import cell_centres, grid_points
 from painter.robot.planners import MakeProgramPlanner
-from painter.scene.load import load_scene
-from painter.scene.sdf import wall_pose
+from painter.robot.true_scene import true_scene
 from painter.scene.surface import is_paintable, surface_at
 from perception.values import WallSegmentation
 
@@ -40,7 +40,9 @@ _QUARTERS = (-0.375, -0.125, 0.125, 0.375)  # Of a cell, where it is sampled.
 
 def main() -> None:
     """Prints a line for each scene."""
-    print("scene        coverage  keep-out  overspray    CV  program  left out  plan")
+    print(
+        "scene        coverage        CV  overspray  keep-out  program  left out  plan"
+    )
     for name in sys.argv[1:] or SCENES:
         scene, _, seed = name.partition(":")
         scenario = load_scenario(scene, [f"random_seed={seed}"] if seed else [])
@@ -67,10 +69,9 @@ def film_figures(
     wall: WallSegmentation,
     scenario: Scenario,
     nominal: float,
-) -> tuple[float, float, float, float]:
-    """Returns coverage, soiled share, overspray and CV of strokes on the true tile."""
-    scene = load_scene(scenario.scene, scenario.random_seed)
-    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+) -> FilmFigures:
+    """Returns the figures of strokes on the true tile."""
+    scene, X_WS = true_scene(scenario)
     X_ST = X_WS.inverse() @ wall.X_WT
     ny, nx = (round(size * wall.cell / FINE) for size in wall.wall_mask.shape)
     p_SQs = X_ST @ grid_points(*cell_centres((ny, nx), FINE))
@@ -89,12 +90,7 @@ def film_figures(
     on_tile = inside.all(axis=0)
     laid = _sampled(film, site, places, X_ST)
     on, off = laid[on_tile & is_paintable(kind)], laid[on_tile & ~is_paintable(kind)]
-    return (
-        float(np.mean(on >= 0.8)),
-        float(np.mean(off >= 0.1)) if off.size else 0.0,
-        float(1.0 - on.sum() / laid.sum()),
-        float(on.std() / on.mean()),
-    )
+    return FilmFigures.of(on, off, laid.sum())
 
 
 def _sampled(

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from painter.planning.config import RasterConfig, TipConfig
+from painter.planning.film.figures import FilmFigures
 from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
 from painter.planning.strokes.raster import plan_strokes, raster_film
@@ -95,11 +96,12 @@ def row(mask: BoolArray, height: FloatArray, strokes: tuple[Stroke, ...]) -> str
         of_coat = [stroke for stroke in strokes if stroke.coat == coat]
         ordered = order_strokes(of_coat, HOME_T, HOME_T)
         seconds += transition_time(ordered, HOME_T, HOME_T)
-    soiled = f"{100 * np.mean(off >= 0.1):7.1f} %" if off.size else "        -"
+    found = FilmFigures.of(on, off, film.sum())
+    keepout = f"{100 * found.keepout_paint:7.1f} %" if off.size else "        -"
     return (
-        f"{len(strokes):7d} {seconds:5.0f} s {100 * np.mean(on >= 0.8):5.1f} % "
-        f"{100 * (1.0 - on.sum() / film.sum()):4.1f} % "
-        f"{100 * on.std() / on.mean():4.1f} % {soiled}"
+        f"{len(strokes):7d} {seconds:5.0f} s {100 * found.coverage:5.1f} % "
+        f"{100 * found.overspray:4.1f} % "
+        f"{100 * found.thickness_cv:4.1f} % {keepout}"
     )
 
 

@@ -8,8 +8,9 @@ from pydrake.systems.analysis import Simulator
 
 from painter.config import Scenario
 from painter.diagrams.paint_cycle import MakePaintCycle
-from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
-from painter.scene import load_scene, surface_at, wall_pose
+from painter.planning.tile import cell_centres, grid_points
+from painter.robot.true_scene import true_scene
+from painter.scene import surface_at
 from painter.systems.values import Phase
 from perception.ground import FrozenValue
 from perception.values import WallSegmentation
@@ -60,8 +61,7 @@ def scan_and_segment(scenario: Scenario) -> ScannedScene:
     begun = {
         data["phase"]: time for time, name, data in status.events if name == "phase"
     }
-    scene = load_scene(scenario.scene, scenario.random_seed)
-    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+    scene, X_WS = true_scene(scenario)
     return ScannedScene(
         segmentation=result.value,
         kind=true_kind(scene, X_WS.inverse() @ result.value.X_WT, result.value),

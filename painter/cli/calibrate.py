@@ -20,7 +20,7 @@ from painter.cli.common import (
 from painter.config import load_scenario
 from painter.errors import InputError
 from painter.planning.arm.kinematics import ArmKinematics
-from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
+from painter.robot.robot_model import MakeRobotModel
 from perception.ground import FloatArray
 from perception.io.frames import Frame, Recording, open_recording
 from perception.mapping.calibration.charuco import BoardConfig, calibrate_on_board
@@ -64,8 +64,7 @@ def calibrate(
     said to be. The two words under "set" make the robot use the answer.
     """
     plan = None if board is None else parse_board(board)
-    plant = MakeArmPlant(load_scenario(scenario, overrides or ()).directives)
-    kinematics = GetArmKinematics(plant)
+    kinematics = MakeRobotModel(load_scenario(scenario, overrides or ())).kinematics
     recording = open_recording(frames, use_poses=False)
     posed = list(with_joints(recording, frames / JOINTS_FILE, kinematics))
     if plan is None:

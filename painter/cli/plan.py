@@ -135,7 +135,7 @@ def plan(
         show(1.0, "done")
     result = program_summary(program) | {
         "planning_time": compute_time,
-        "predicted": preview.figures(),
+        "predicted": preview.figures._asdict(),
     }
     for item in program.skipped:
         typer.echo(

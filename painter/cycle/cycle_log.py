@@ -16,7 +16,6 @@ from painter.systems.values import (
 from perception.ground import FloatArray, FrozenValue
 from perception.values import SurfaceMap, WallSegmentation
 
-NQ = 5
 LOG_PERIOD = 0.01
 CLEARANCE_PERIOD = 0.05
 # Robot time between looks at the cycle from outside, s.

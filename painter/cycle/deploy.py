@@ -19,12 +19,11 @@ from painter.cycle.simulate import Evaluate, Watch
 from painter.diagrams.hardware_station import RobotConnection
 from painter.diagrams.paint_cycle import MakePaintCycle, PaintCycleDiagram
 from painter.errors import BusError
+from painter.planning.arm.kinematics import NQ
 from painter.planning.program.remainder import Remainder
-from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
 from painter.systems.values import CycleStatus, OperatorCommand, Phase
 from perception.ground import FloatArray
 
-NQ = 5
 # Time between looks at the cycle from outside, s.
 WATCH_PERIOD = 0.02
 # Further behind than this while the arm stands, the diagram's clock is stopped, s.
@@ -136,7 +135,7 @@ def DeployCycle(
     bus.wait_until(clock.execution(context.get_time()) + 2.0 * connection.cycle)
     recorder.take()
     log = _MakeLog(
-        scenario, cycle, context, status, look_image,
+        cycle, context, status, look_image,
         samples=recorder.samples(), clock=clock, desired=commands.FindLog(context),
     )  # fmt: skip
     return dataclasses.replace(
@@ -220,7 +219,6 @@ def on_course_until(log: CycleLog, stop: float) -> float:
 
 
 def _MakeLog(
-    scenario: Scenario,
     cycle: PaintCycleDiagram,
     context: Context,
     status: CycleStatus,
@@ -230,7 +228,7 @@ def _MakeLog(
     clock: RobotClock,
     desired: Any,
 ) -> CycleLog:
-    kinematics = GetArmKinematics(MakeArmPlant(scenario.directives))
+    kinematics = cycle.robot.kinematics
     time = robot_times(samples.time, clock)
     kept = np.isfinite(time)
     stamps = executions(desired.sample_times(), clock)

@@ -11,13 +11,12 @@ from painter.canopen.analysis.log_bus import LogBus
 from painter.canopen.process.robot_clock import RobotClock
 from painter.config import Scenario
 from painter.diagrams.hardware_station import MakeHardwareStation, RobotConnection
-from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
+from painter.planning.arm.kinematics import NQ
+from painter.robot.robot_model import MakeRobotModel
 from painter.systems.ports import EvalAs
 from painter.systems.simulated.gun_pose import GunPose
 from painter.systems.values import ArmStatus
 from perception.ground import FloatArray
-
-NQ = 5
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ def ReplayLog(scenario: Scenario, bus: LogBus, cycle: float) -> Replay:
     clock = RobotClock()
     clock.start(bus.begin)
     connection = RobotConnection(bus=bus, clock=clock, cycle=cycle, read_camera=Reading)
-    kinematics = GetArmKinematics(MakeArmPlant(scenario.directives))
+    kinematics = MakeRobotModel(scenario).kinematics
     builder = DiagramBuilder()
     station = builder.AddSystem(MakeHardwareStation(scenario, connection))
     gun = builder.AddNamedSystem("gun_pose", GunPose(kinematics=kinematics))

@@ -14,7 +14,7 @@ from painter.canopen.master.feedback import BusState
 from painter.canopen.process.robot_clock import Bus
 from painter.config import Scenario
 from painter.errors import BusError
-from painter.robot.arm_model import GetArmLimits, MakeArmPlant
+from painter.robot.robot_model import MakeRobotModel
 
 LEAST_DISK = 1 << 30  # A run takes some 10 MB, a log of the bus 15 MB a minute.
 OLDEST_PICTURE = 1.0
@@ -80,7 +80,7 @@ def check_disk(out: Path) -> Check:
 
 def check_calibration(scenario: Scenario, bus: BusConfig) -> Check:
     """Checks that bus file and arm model tell of the same joints."""
-    limits = GetArmLimits(MakeArmPlant(scenario.directives))
+    limits = MakeRobotModel(scenario).limits
     joints = bus.joint_limits()
     apart = np.array(
         [

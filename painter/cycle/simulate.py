@@ -13,8 +13,8 @@ from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 from painter.config import Scenario
 from painter.cycle.cycle_log import CycleLog, GunPoses
 from painter.diagrams.paint_cycle import MakePaintCycle, PaintCycleDiagram
+from painter.planning.arm.kinematics import NQ
 from painter.planning.program.remainder import Remainder
-from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import (
     CycleStatus,
@@ -24,7 +24,6 @@ from painter.systems.values import (
     StageResult,
 )
 
-NQ = 5
 LOG_PERIOD = 0.01
 CLEARANCE_PERIOD = 0.05
 # Robot time between looks at the cycle from outside, s.
@@ -91,7 +90,7 @@ def SimulateCycle(
             look_image = _ColorImage(cycle, context)
         if status.finished:
             break
-    return _MakeLog(scenario, cycle, context, sinks, status, look_image)
+    return _MakeLog(cycle, context, sinks, status, look_image)
 
 
 def Evaluate(cycle: PaintCycleDiagram, context: Context, port: str) -> Any:
@@ -105,7 +104,6 @@ def _ColorImage(cycle: PaintCycleDiagram, context: Context) -> npt.NDArray[np.ui
 
 
 def _MakeLog(
-    scenario: Scenario,
     cycle: PaintCycleDiagram,
     context: Context,
     sinks: dict[str, VectorLogSink],
@@ -114,7 +112,6 @@ def _MakeLog(
 ) -> CycleLog:
     logs = {name: sink.FindLog(context) for name, sink in sinks.items()}
     data = {name: log.data().copy() for name, log in logs.items()}
-    kinematics = GetArmKinematics(MakeArmPlant(scenario.directives))
     segmentation: StageResult = Evaluate(cycle, context, "segmentation")
     program: StageResult = Evaluate(cycle, context, "program")
     return CycleLog(
@@ -124,8 +121,8 @@ def _MakeLog(
         q=data["measured"][:NQ].T.copy(),
         v=data["measured"][NQ:].T.copy(),
         trigger=data["trigger"][0].copy(),
-        X_WG=GunPoses(kinematics, data["state"][:NQ].T),
-        X_WG_desired=GunPoses(kinematics, data["desired"][:NQ].T),
+        X_WG=GunPoses(cycle.robot.kinematics, data["state"][:NQ].T),
+        X_WG_desired=GunPoses(cycle.robot.kinematics, data["desired"][:NQ].T),
         clearance_time=logs["clearance"].sample_times().copy(),
         clearance=data["clearance"][0].copy(),
         floor_clearance=data["floor_clearance"][0].copy(),

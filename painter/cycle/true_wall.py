@@ -11,10 +11,8 @@ from painter.planning.tile import (
     cell_centres,
     grid_points,
     grid_shape,
-    nominal_tile_pose,
 )
-from painter.scene.load import load_scene
-from painter.scene.sdf import wall_pose
+from painter.robot.true_scene import true_scene
 from painter.scene.surface import is_paintable, surface_at
 from perception.values import WallSegmentation
 
@@ -29,7 +27,7 @@ def true_segmentation(scenario: Scenario, *, cell: float = 0.01) -> WallSegmenta
     Returns:
         Labels 1 = wall to be painted, 2 = all else; no cell is unseen.
     """
-    scene = load_scene(scenario.scene, scenario.random_seed)
+    scene, X_WT = true_scene(scenario)
     ny, nx = grid_shape(scenario.tile, cell)
     p_TQs = grid_points(*cell_centres((ny, nx), cell))
     height, kind = surface_at(scene, p_TQs[0], p_TQs[1])
@@ -39,6 +37,6 @@ def true_segmentation(scenario: Scenario, *, cell: float = 0.01) -> WallSegmenta
         labels=np.where(paintable, 1, 2).astype(np.uint16),
         depth=depth.astype(np.float32),
         wall_mask=paintable,
-        X_WT=wall_pose(scene, nominal_tile_pose(scenario.tile)),
+        X_WT=X_WT,
         cell=cell,
     )

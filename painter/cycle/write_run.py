@@ -6,13 +6,12 @@ from PIL import Image
 
 from painter.config import Scenario
 from painter.cycle.cycle_log import CycleLog, clearance_violations
-from painter.planning.tile import cell_centres, grid_points, nominal_tile_pose
+from painter.planning.tile import cell_centres, grid_points
 from painter.planning.zones import points_in_zones
+from painter.robot.true_scene import true_scene
 from painter.run.figures.predicted_film import run_preview
 from painter.run.folder.folder import LOOK, RunFolder
 from painter.run.folder.values import Executed, Film, Truth
-from painter.scene.load import load_scene
-from painter.scene.sdf import wall_pose
 from painter.scene.surface import height_field, is_paintable, surface_at
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
@@ -106,8 +105,7 @@ def write_truth(
         film: What is on the wall.
         before: Film that was there before it; None = none.
     """
-    scene = load_scene(scenario.scene, scenario.random_seed)
-    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+    scene, X_WS = true_scene(scenario)
     X_ST = X_WS.inverse() @ segmentation.X_WT
     ny, nx = segmentation.labels.shape
     x, y = cell_centres((ny, nx), segmentation.cell)

@@ -12,9 +12,9 @@ from pydrake.systems.primitives import (
 )
 
 from painter.config import Scenario
+from painter.planning.arm.kinematics import NQ
 from painter.robot.arm_model import MakeArmPlant
 
-NQ = 5
 # The drives differentiate their velocity set-point over this time for feed-forward.
 FEED_FORWARD_PERIOD = 0.004
 

@@ -12,10 +12,8 @@ from painter.config import Scenario
 from painter.diagrams.station import MakeStation
 from painter.planning.program.remainder import Remainder
 from painter.planning.tile import nominal_tile_pose
-from painter.robot.planners import (
-    MakeFreeMotionPlanner,
-    MakeProgramPlanner,
-)
+from painter.robot.planners import MakeFreeMotionPlanner, MakeProgramPlanner
+from painter.robot.robot_model import MakeRobotModel, RobotModel
 from painter.systems.brain.camera_pose import CameraPose
 from painter.systems.brain.known_result import KnownResult
 from painter.systems.brain.map_accumulator import MapAccumulator
@@ -49,11 +47,14 @@ BRAIN_TO_STATION = ("arm.desired_state", "gun.trigger")
 JOINT_HISTORY = 4.0
 
 
-def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diagram:
+def MakeBrain(
+    scenario: Scenario, robot: RobotModel, *, remainder: Remainder | None = None
+) -> Diagram:
     """Makes the brain: all that looks, decides and plans, the same on every connection.
 
     Args:
         scenario: The job.
+        robot: The job's robot.
         remainder: What is left to do on a wall that was seen before; None = look at
             the wall and paint all of it.
 
@@ -64,14 +65,14 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
         `program`.
     """
     builder = DiagramBuilder()
-    planner = MakeProgramPlanner(scenario)
+    planner = MakeProgramPlanner(scenario, robot)
     X_WT_expected = nominal_tile_pose(scenario.tile)
     period = scenario.cycle.period
     add = builder.AddNamedSystem
     camera_pose = add(
         "camera_pose",
         CameraPose(
-            kinematics=planner.kinematics,
+            kinematics=robot.kinematics,
             length=JOINT_HISTORY,
             X_CCm=RigidTransform(
                 RollPitchYaw(np.deg2rad(scenario.wall_camera.calibrated_deg)),
@@ -93,7 +94,7 @@ def MakeBrain(scenario: Scenario, *, remainder: Remainder | None = None) -> Diag
     mover = add(
         "motion_planner",
         MotionPlanner(
-            planner=MakeFreeMotionPlanner(scenario, planner),
+            planner=MakeFreeMotionPlanner(scenario, robot),
             cell=scenario.segmentation.cell,
             period=period,
         ),
@@ -231,11 +232,13 @@ class PaintCycleDiagram:
             their own names, and the brain's input `operator`.
         station: The station in it.
         brain: The brain in it.
+        robot: The robot that the brain plans for.
     """
 
     diagram: Diagram
     station: Diagram
     brain: Diagram
+    robot: RobotModel
 
 
 def MakePaintCycle(
@@ -259,7 +262,8 @@ def MakePaintCycle(
     station = builder.AddSystem(
         MakeStation(scenario, connection=connection, film=film, meshcat=meshcat)
     )
-    brain = builder.AddSystem(MakeBrain(scenario, remainder=remainder))
+    robot = MakeRobotModel(scenario)
+    brain = builder.AddSystem(MakeBrain(scenario, robot, remainder=remainder))
     for name in STATION_TO_BRAIN:
         builder.Connect(station.GetOutputPort(name), brain.GetInputPort(name))
     for name in BRAIN_TO_STATION:
@@ -271,4 +275,4 @@ def MakePaintCycle(
             builder.ExportOutput(port, port.get_name())
     diagram = builder.Build()
     diagram.set_name("paint_cycle")
-    return PaintCycleDiagram(diagram=diagram, station=station, brain=brain)
+    return PaintCycleDiagram(diagram=diagram, station=station, brain=brain, robot=robot)

@@ -9,10 +9,8 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from painter.config import Scenario
 from painter.diagrams.joint_loop import AddJointLoop
 from painter.diagrams.surroundings import AddScene, AddSurroundings
-from painter.planning.tile import nominal_tile_pose
 from painter.robot.arm_model import AddRobot
-from painter.scene.load import load_scene
-from painter.scene.sdf import wall_pose
+from painter.robot.true_scene import true_scene
 from painter.systems.simulated.joint_encoder import JointEncoder
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.simulated.simulated_drives import SimulatedDrives
@@ -43,8 +41,7 @@ def MakeSimStation(
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(scenario.plant_config, builder)
     AddRobot(Parser(plant), scenario.directives)
-    scene = load_scene(scenario.scene, scenario.random_seed)
-    X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+    scene, X_WS = true_scene(scenario)
     AddScene(plant, scene, X_WS)
     plant.Finalize()
     arm = plant.GetModelInstanceByName("arm")

@@ -8,7 +8,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from painter.canopen.config.units import axes_from_joints, joints_from_axes
 from painter.config import Scenario
-from painter.diagrams.joint_loop import NQ, AddJointLoop
+from painter.diagrams.joint_loop import AddJointLoop
+from painter.planning.arm.kinematics import NQ
 from painter.robot.arm_model import AddRobot
 from perception.ground import FloatArray
 

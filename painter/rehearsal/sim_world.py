@@ -14,14 +14,12 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from painter.config import Scenario
 from painter.diagrams.surroundings import AddScene, AddSurroundings
-from painter.planning.tile import nominal_tile_pose
+from painter.planning.arm.kinematics import NQ
 from painter.robot.arm_model import AddRobot
-from painter.scene.load import load_scene
-from painter.scene.sdf import wall_pose
+from painter.robot.true_scene import true_scene
 from painter.systems.simulated.paint_film import FilmState
 from perception.ground import FloatArray
 
-NQ = 5
 CLEARANCE_PERIOD = 0.05
 
 
@@ -57,8 +55,7 @@ class SimWorld:
         plant = MultibodyPlant(0.0)
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         AddRobot(Parser(plant), scenario.directives)
-        scene = load_scene(scenario.scene, scenario.random_seed)
-        X_WS = wall_pose(scene, nominal_tile_pose(scenario.tile))
+        scene, X_WS = true_scene(scenario)
         AddScene(plant, scene, X_WS)
         plant.Finalize()
         state = builder.AddNamedSystem("state", PassThrough(2 * NQ))

@@ -19,6 +19,7 @@ from painter.canopen.process.realtime import set_niceness
 from painter.canopen.process.sample_ring import SampleRing
 from painter.config import Scenario, dump_scenario, load_scenario
 from painter.errors import PainterError
+from painter.planning.arm.kinematics import NQ
 from painter.rehearsal.sim_world import SimWorld
 from painter.systems.simulated.paint_film import FilmState
 from perception.ground import FloatArray
@@ -31,7 +32,6 @@ _COLOR_EVERY = 5
 _BLACK_PERIOD = 0.25
 _PATIENCE = 120.0
 _NICENESS = -15
-NQ = 5
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,50 +3,40 @@
 from painter.config import Scenario
 from painter.planning.program.program import ProgramPlanner
 from painter.planning.scan.free_motion import FreeMotionPlanner
-from painter.robot.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeArmPlant,
-    MakeCollisionChecker,
-)
+from painter.robot.robot_model import MakeRobotModel, RobotModel
 
 
-def MakeProgramPlanner(scenario: Scenario) -> ProgramPlanner:
-    """Makes the planner of paint programs, the same for every body of the robot.
+def MakeProgramPlanner(
+    scenario: Scenario, robot: RobotModel | None = None
+) -> ProgramPlanner:
+    """Makes the planner of paint programs, the same for every connection of the robot.
 
     Args:
-        scenario: Gives the robot's directives, tip and settings.
+        scenario: Gives tip and settings.
+        robot: The scenario's robot; None = make it.
     """
-    plant = MakeArmPlant(scenario.directives)
-    kinematics = GetArmKinematics(plant)
-    limits = GetArmLimits(plant)
+    robot = robot or MakeRobotModel(scenario)
     return ProgramPlanner(
-        kinematics=kinematics,
-        limits=limits.replace(
-            nozzle=kinematics.nozzle, nozzle_speed=scenario.motion.nozzle_speed
-        ),
-        checker=MakeCollisionChecker(
-            scenario.directives, clearance=scenario.motion.clearance
-        ),
+        kinematics=robot.kinematics,
+        limits=robot.limits,
+        checker=robot.checker,
         tip=scenario.gun.tip,
         raster=scenario.raster,
         motion=scenario.motion,
     )
 
 
-def MakeFreeMotionPlanner(
-    scenario: Scenario, programs: ProgramPlanner
-) -> FreeMotionPlanner:
+def MakeFreeMotionPlanner(scenario: Scenario, robot: RobotModel) -> FreeMotionPlanner:
     """Makes the planner of motions with the gun closed.
 
     Args:
         scenario: Gives tile and settings.
-        programs: Planner of programs for the same robot.
+        robot: The scenario's robot.
     """
     return FreeMotionPlanner(
-        kinematics=programs.kinematics,
-        limits=programs.limits,
-        checker=programs.checker,
+        kinematics=robot.kinematics,
+        limits=robot.limits,
+        checker=robot.checker,
         tile=scenario.tile,
         scan=scenario.scan,
         motion=scenario.motion,

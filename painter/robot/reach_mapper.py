@@ -11,15 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
-from pydrake.planning import SceneGraphCollisionChecker
 
 from painter.config import Scenario
 from painter.planning.arm.reach_map import ReachTask, TileReach, placement, tile_reach
-from painter.robot.arm_model import (
-    GetArmKinematics,
-    GetArmLimits,
-    MakeCollisionChecker,
-)
+from painter.robot.robot_model import MakeRobotModel
 
 VFOV_DEG = 58.0  # Source: Intel RealSense D400 family data sheet, D435 depth, 16:9.
 DISTANCES = np.linspace(0.70, 1.40, 15)
@@ -41,11 +36,9 @@ class ReachMapper:
             scenario: Gives the tile, stand-offs, clearance and directives.
         """
         self._scenario = scenario
-        self._checker: SceneGraphCollisionChecker = MakeCollisionChecker(
-            scenario.directives, clearance=scenario.motion.clearance
-        )
-        self.arm = GetArmKinematics(self._checker.plant())
-        self.limits = GetArmLimits(self._checker.plant())
+        robot = MakeRobotModel(scenario)
+        self._checker = robot.checker.Clone()
+        self.arm, self.limits = robot.kinematics, robot.limits
         self.task = ReachTask.make(
             standoff=scenario.raster.standoff,
             scan_distance=scenario.scan.distance,

@@ -16,7 +16,7 @@ from painter.cycle.true_wall import true_segmentation
 from painter.planning.program.program import strokes_from
 from painter.planning.program.remainder import Remainder
 from painter.planning.spray_path import Stroke
-from painter.robot.arm_model import GetArmKinematics, MakeArmPlant
+from painter.robot.robot_model import MakeRobotModel
 from painter.systems.values import Phase
 from tests.hil import Loop, small_scenario
 
@@ -104,7 +104,7 @@ def paint(strike, *, on_watch=lambda loop: None):
     """Paints until the fault has ended the cycle; returns loop, witness and log."""
     scenario, remainder = job()
     loop = Loop(scenario, world=False).bring_up()
-    witness = Witness(strike, GetArmKinematics(MakeArmPlant(scenario.directives)))
+    witness = Witness(strike, MakeRobotModel(scenario).kinematics)
     loop.observers.append(witness)
     log = None
     try:

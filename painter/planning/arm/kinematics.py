@@ -15,6 +15,7 @@ from pydrake.math import RigidTransform
 
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
+NQ = 5  # Joints of the arm.
 # How far X_LG and X_LC may be from the form that the closed-form inverse needs.
 _MOUNT_TOLERANCE = 1e-9
 

@@ -56,7 +56,7 @@ def save_program(
         "standoff": program.standoff,
         "nominal_thickness": program.nominal_thickness,
         "paint_volume": program.paint_volume,
-        "predicted": None if preview is None else preview.figures(),
+        "predicted": None if preview is None else preview.figures._asdict(),
         "strokes": strokes,
         "skipped": [
             _stroke_fields(item.stroke) | {"reason": item.reason}

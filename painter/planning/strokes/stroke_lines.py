@@ -16,6 +16,7 @@ from scipy.special import beta
 
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.film.deposition import best_pitch, flow_share, half_axes
+from painter.planning.film.figures import COVERED
 from painter.planning.tile import cell_centres
 from perception.ground import BoolArray, FloatArray, IntArray
 
@@ -26,8 +27,6 @@ from perception.ground import BoolArray, FloatArray, IntArray
 # bounds.
 _OVERSPRAY_WEIGHT = 1.85
 _UNEVENNESS_WEIGHT = 0.25
-# Film share at which wall counts as covered.
-_COVERED = 0.8
 # Steps a pitch is divided into, the closest lines in steps, and how far the pitch may
 # exceed the widest: the film's variation then grows by less than one percentage point
 # at gamma = 2 (`raster_cv`).
@@ -170,7 +169,7 @@ def _reach(pitch: float, *, tip: TipConfig, raster: RasterConfig) -> float:
     """Returns how far from a line one stroke alone covers the wall, m."""
     a, _ = half_axes(tip, raster.standoff)
     peak = pitch / (a * beta(0.5, tip.gamma + 1.0))
-    core = 1.0 - (_COVERED / peak) ** (1.0 / tip.gamma)
+    core = 1.0 - (COVERED / peak) ** (1.0 / tip.gamma)
     return float(a * math.sqrt(max(core, 0.0)))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from painter.planning.config import RasterConfig, TipConfig
+from painter.planning.film.figures import COVERED
 from painter.planning.film.film_cost import FilmCost
 from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
@@ -16,7 +17,6 @@ from painter.planning.strokes.film_fit import FilmFit
 from painter.planning.strokes.raster import fitted_strokes
 from perception.ground import FloatArray
 
-_THIN = 0.8  # Share of the nominal film.
 _NARROWEST = 0.03  # m; thinner strips are the soft edges that every job has.
 
 
@@ -47,7 +47,7 @@ def touch_up_strokes(
         raise ValueError(f"film is {film.shape} cells, the site {site.wanted.shape}.")
     narrowest = max(1, round(_NARROWEST / site.cell))
     thin = ndimage.binary_opening(
-        site.wanted & (film < _THIN * nominal), np.ones((narrowest, narrowest))
+        site.wanted & (film < COVERED * nominal), np.ones((narrowest, narrowest))
     )
     if not thin.any():
         return ()

@@ -3,12 +3,11 @@
 import numpy as np
 from scipy import ndimage
 
+from painter.planning.film.figures import COVERED, OVERSPRAYED
 from painter.run.folder.values import Film
 from perception.ground import BoolArray
 
-COVERED = 0.8
-HALF_COVERED = 0.5
-SOILED = 0.1
+HALF_COVERED = 0.5  # Share of nominal.
 
 
 def film_figures(film: Film, *, nominal: float, fan_width: float) -> dict:
@@ -39,7 +38,7 @@ def film_figures(film: Film, *, nominal: float, fan_width: float) -> dict:
         "thickness_cv": variation(on_wall),
         "thickness_cv_interior": variation(film.thickness[far]),
         "overspray": overspray(film),
-        "keepout_paint": _share(on_keepout >= SOILED * nominal),
+        "keepout_paint": _share(on_keepout >= OVERSPRAYED * nominal),
     }
 
 

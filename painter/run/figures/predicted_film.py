@@ -73,7 +73,7 @@ def predicted_figures(
     tile = film.truth_paintable | film.truth_keepout
     error = np.abs(planned - film.thickness)[tile].mean()
     return {
-        "predicted_coverage": preview.coverage,
-        "predicted_overspray": preview.overspray,
+        "predicted_coverage": preview.figures.coverage,
+        "predicted_overspray": preview.figures.overspray,
         "predicted_film_error": float(error / program.nominal_thickness),
     }

@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from painter.planning.film.figures import COVERED
 from painter.planning.spray_path import PaintProgram
-from painter.run.figures.film_figures import COVERED, HALF_COVERED, edge_distance
+from painter.run.figures.film_figures import HALF_COVERED, edge_distance
 from painter.run.figures.time_figures import (
     STOPPED,
     Event,

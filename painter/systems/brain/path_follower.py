@@ -14,12 +14,12 @@ from pydrake.systems.framework import (
 )
 
 from painter.errors import MotionLimitError
+from painter.planning.arm.kinematics import NQ
 from painter.planning.spray_path import Motion
 from painter.systems.ports import EvalAs
 from painter.systems.values import FollowerStatus, MotionCommand
 from perception.ground import FloatArray, FrozenValue
 
-NQ = 5
 # A motion begins where the arm stands: 1 mrad is 2 mm at full reach.
 START_TOLERANCE = 1e-3
 

@@ -16,11 +16,11 @@ from painter.canopen.master.feedback import BusState, Feedback
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.robot_clock import Bus, RobotClock
 from painter.errors import BusError
+from painter.planning.arm.kinematics import NQ
 from painter.systems.ports import EvalAs
 from painter.systems.values import ArmStatus, CameraStatus, DriveStatus
 from perception.ground import FloatArray, FrozenValue
 
-NQ = 5
 # How far back samples are read: what the diagram may be behind, and a few cycles.
 _HISTORY = 2.0
 

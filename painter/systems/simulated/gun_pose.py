@@ -4,9 +4,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, LeafSystem
 
-from painter.planning.arm.kinematics import ArmKinematics
-
-NQ = 5
+from painter.planning.arm.kinematics import NQ, ArmKinematics
 
 
 class GunPose(LeafSystem):

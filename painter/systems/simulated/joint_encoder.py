@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-NQ = 5
+from painter.planning.arm.kinematics import NQ
 
 
 class JointEncoder(LeafSystem):

@@ -6,9 +6,8 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, LeafSystem
 
+from painter.planning.arm.kinematics import NQ
 from painter.systems.values import ArmStatus, DriveStatus
-
-NQ = 5
 
 
 class SimulatedDrives(LeafSystem):

@@ -21,7 +21,9 @@ def test_film_is_found_again_in_tile_coordinates(make_wall):
     assert found == pytest.approx([peak, 0.0], rel=0.01, abs=1e-9)
     volume = dut.film.sum() * dut.cell**2
     assert volume == pytest.approx(TIP.flow * TIP.transfer_efficiency * 1.6 / 0.6)
-    assert dut.keepout_paint == 0.0 and dut.overspray == pytest.approx(0.0, abs=1e-9)
+    assert dut.figures.keepout_paint == 0.0 and dut.figures.overspray == pytest.approx(
+        0.0, abs=1e-9
+    )
 
 
 def test_paint_on_what_stays_clean_is_counted(make_wall):
@@ -30,13 +32,13 @@ def test_paint_on_what_stays_clean_is_counted(make_wall):
     dut = preview_film(strokes, wall, tip=TIP, nominal=NOMINAL)
     # Half of the fan lands on the patch, over half of the stroke, and at both ends
     # 3/16 of half the fan's thickness, on average over its ellipse, leaves the tile.
-    assert dut.overspray == pytest.approx(0.25, abs=0.005)
-    assert 0.08 < dut.keepout_paint < 0.125
+    assert dut.figures.overspray == pytest.approx(0.25, abs=0.005)
+    assert 0.08 < dut.figures.keepout_paint < 0.125
 
 
 def test_nothing_sprayed_is_nothing_covered(make_wall):
     dut = preview_film((), make_wall(), tip=TIP, nominal=NOMINAL)
-    assert dut.figures() == {
+    assert dut.figures._asdict() == {
         "coverage": 0.0,
         "thickness_cv": 0.0,
         "overspray": 0.0,

@@ -54,9 +54,9 @@ def test_what_the_operator_left_out_does_not_count_as_bare(full_folder, program)
     scenario = full_folder.scenario()
     kept = [s for s in program.strokes if s.start_T[0] < 1.0]
     half = program.replace(strokes=tuple(kept))
-    bare = run_preview(full_folder, half, scenario).coverage
+    bare = run_preview(full_folder, half, scenario).figures.coverage
     scenario["raster"]["zones"] = [{"kind": "include", "corners": [[0, 0], [1, 2]]}]
-    asked = run_preview(full_folder, half, scenario).coverage
+    asked = run_preview(full_folder, half, scenario).figures.coverage
     assert bare < 0.6
     assert asked > 0.9
 
