@@ -25,7 +25,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from perception.config import MapConfig, SegmentationConfig, StereoConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable_pixels
 from perception.depth_camera.stereo import StereoModel
 from perception.mapping.fusion.voxel_map import VoxelMap
 from perception.segmentation import segment_wall
@@ -56,8 +56,8 @@ def true_depth(
 ) -> np.ndarray:
     """Returns the picture without errors, (H, W) m."""
     column, row = np.meshgrid(np.arange(intrinsics.width), np.arange(intrinsics.height))
-    x = (column - intrinsics.cx) / intrinsics.fx
-    y = -(row - intrinsics.cy) / intrinsics.fy
+    x, y = intrinsics.rays(column, row)
+    y = -y
     # A ray meets the plate if it passes the nearer of plate and wall within its sides.
     near = p_TC[2] - max(step, 0.0)
     on = on_plate(p_TC[0] + near * x, p_TC[1] + near * y, shift)
@@ -78,7 +78,7 @@ def measure(
         )
         depth = true_depth(p_TC, step, shift, intrinsics)
         depth_mm = model.measure(depth, depth, np.random.default_rng([1, number]))
-        p_CQs = backproject(
+        p_CQs = depth_points(
             depth_mm, usable_pixels(depth_mm, config), intrinsics, config.stride
         )
         voxels = voxels.fuse(RigidTransform(R_TC, p_TC) @ p_CQs, p_TC)

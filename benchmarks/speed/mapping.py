@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from painter.planning.config import TileConfig
 from painter.planning.tile import nominal_tile_pose
 from perception.config import MapConfig, StereoConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable_pixels
 from perception.depth_camera.stereo import StereoModel
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.fusion.voxel_map import VoxelMap
@@ -49,7 +49,7 @@ def main() -> None:
         model.measure(window, wall, np.random.default_rng([1, number]))
         marks.append(time.perf_counter())
         usable = usable_pixels(depth_mm, config)
-        p_WQs = X_WC @ backproject(depth_mm, usable, intrinsics, config.stride)
+        p_WQs = X_WC @ depth_points(depth_mm, usable, intrinsics, config.stride)
         marks.append(time.perf_counter())
         voxels = voxels.fuse(p_WQs, X_WC.translation())
         marks.append(time.perf_counter())

@@ -283,15 +283,10 @@ def _try_recording(path: str) -> None:
 
 def _intrinsics(name: str, profile: Any) -> CameraIntrinsics:
     lens = profile.as_video_stream_profile().get_intrinsics()
-    if any(lens.coeffs):
-        raise CameraError(
-            f"camera {name}: its depth is distorted, not rectified.",
-            code="PNT-CAMERA-017",
-        )
-    return CameraIntrinsics(
-        fx=lens.fx, fy=lens.fy, cx=lens.ppx, cy=lens.ppy,
-        width=lens.width, height=lens.height,
-    )  # fmt: skip
+    try:
+        return CameraIntrinsics.from_librealsense(lens)
+    except ValueError as error:
+        raise CameraError(f"camera {name}: {error}.", code="PNT-CAMERA-017") from error
 
 
 def _line(error: Exception) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 from painter.errors import InputError
 from perception.ground import FloatArray
 from perception.io.bags import BAG_SUFFIXES, read_bag
+from perception.io.camera_file import INTRINSICS_FILE
 from perception.io.clouds import RecordedCloud, read_cloud
-from perception.io.depth_images import DEPTH_SUFFIX, INTRINSICS_NAME, read_depth_frames
+from perception.io.depth_images import DEPTH_SUFFIX, read_depth_frames
 
 
 class Unit(enum.StrEnum):
@@ -114,7 +115,7 @@ def read_input(path: Path, *, intrinsics: Path | None, unit: Unit) -> RecordedCl
         images = _depth_images(path) if path.is_dir() else [path]
         if not path.is_dir() and not path.exists():
             raise InputError(f"{path}: no such file.", code="PNT-USE-041")
-        beside = images[0].with_name(INTRINSICS_NAME)
+        beside = images[0].with_name(INTRINSICS_FILE)
         camera = beside if intrinsics is None and beside.exists() else intrinsics
         if camera is None:
             raise InputError(

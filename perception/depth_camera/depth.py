@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,8 @@ import numpy.typing as npt
 from perception.config import MapConfig, StereoConfig
 from perception.depth_camera.windows import moving_max, moving_min
 from perception.ground import BoolArray, FloatArray
+
+Pixels = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,70 @@ class CameraIntrinsics:
             height=config.height,
         )
 
+    @classmethod
+    def from_librealsense(cls, lens: Any) -> Self:
+        """Takes over the intrinsics of a rectified stream.
+
+        Args:
+            lens: librealsense's `intrinsics`.
+
+        Raises:
+            ValueError: The stream is distorted.
+        """
+        if any(lens.coeffs):
+            raise ValueError(f"its depth is distorted ({lens.model}), not rectified")
+        return cls(
+            fx=lens.fx,
+            fy=lens.fy,
+            cx=lens.ppx,
+            cy=lens.ppy,
+            width=lens.width,
+            height=lens.height,
+        )
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The (3, 3) camera matrix, px, as OpenCV takes it."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]])
+
+    def rays(self, column: Pixels, row: Pixels) -> tuple[Pixels, Pixels]:
+        """Returns where the rays of pixels meet the plane z = 1 of C.
+
+        Args:
+            column: Any shape, px; fractions are allowed.
+            row: Any shape, px.
+
+        Returns:
+            x and y, without unit, of the shapes given.
+        """
+        return (column - self.cx) / self.fx, (row - self.cy) / self.fy
+
+    def backproject(self, column: Pixels, row: Pixels, z: Pixels) -> FloatArray:
+        """Returns the points that pixels show.
+
+        Args:
+            column: Any shape, px; fractions are allowed.
+            row: The same, or a shape that goes together with it.
+            z: Depth along C's z, m; of the shape that the two give together.
+
+        Returns:
+            (3, ...) m, in C (x right, y down, z ahead).
+        """
+        x, y = self.rays(column, row)
+        return np.stack([x * z, y * z, z])
+
+    def project(self, p_CQs: FloatArray) -> FloatArray:
+        """Returns the pixels that show points.
+
+        Args:
+            p_CQs: (3, N) m, in C, none with z = 0.
+
+        Returns:
+            (2, N) column and row, px, with fractions; may lie outside the picture.
+        """
+        x, y, z = p_CQs
+        return np.stack([self.fx * x / z + self.cx, self.fy * y / z + self.cy])
+
 
 def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolArray:
     """Finds the pixels whose depth can be trusted.
@@ -83,25 +149,25 @@ def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolAr
     return usable
 
 
-def backproject(
+def depth_points(
     depth_mm: npt.NDArray[np.uint16],
     usable: BoolArray,
     intrinsics: CameraIntrinsics,
     stride: int = 1,
 ) -> FloatArray:
-    """Turns pixels into points.
+    """Returns the points of a depth image.
 
     Args:
         depth_mm: (H, W) uint16, mm, along C's z.
-        usable: (H, W) bool, which pixels to take.
+        usable: (H, W) bool, the pixels to take.
         intrinsics: Of the camera.
-        stride: Every so many-th pixel and row is taken.
+        stride: Takes every `stride`-th column and row.
 
     Returns:
         (3, N) float64, m, in C (x right, y down, z ahead), row by row.
 
     Raises:
-        ValueError: The picture is not of the camera's size.
+        ValueError: The image does not have the camera's size.
     """
     expected = (intrinsics.height, intrinsics.width)
     if depth_mm.shape != expected or usable.shape != expected:
@@ -111,7 +177,4 @@ def backproject(
         )
     row, column = np.nonzero(usable[::stride, ::stride])
     row, column = stride * row, stride * column
-    z = depth_mm[row, column] / 1000.0
-    x = (column - intrinsics.cx) / intrinsics.fx * z
-    y = (row - intrinsics.cy) / intrinsics.fy * z
-    return np.stack([x, y, z])
+    return intrinsics.backproject(column, row, depth_mm[row, column] / 1000.0)

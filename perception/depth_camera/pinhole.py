@@ -27,25 +27,15 @@ class PinholeMap:
         names = ("fx", "fy", "cx", "cy", "width", "height")
         off = [abs(getattr(taken, name) - getattr(wanted, name)) for name in names]
         self.is_identity = max(off) <= _SAME
-        column = _pixels(wanted.width, wanted.cx, wanted.fx, taken.cx, taken.fx)
-        row = _pixels(wanted.height, wanted.cy, wanted.fy, taken.cy, taken.fy)
-        self._seen = np.outer(
-            (row >= 0) & (row < taken.height), (column >= 0) & (column < taken.width)
-        )
-        self._index = np.ix_(
-            row.clip(0, taken.height - 1), column.clip(0, taken.width - 1)
-        )
+        row, column = np.indices((wanted.height, wanted.width))
+        p_CQs = wanted.backproject(column, row, np.ones(row.shape))
+        column, row = np.rint(taken.project(p_CQs)).astype(np.int64)
+        self._seen = (row >= 0) & (row < taken.height)
+        self._seen &= (column >= 0) & (column < taken.width)
+        self._index = row.clip(0, taken.height - 1), column.clip(0, taken.width - 1)
 
     def apply(self, picture: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
         """Returns (H, W) uint16 of the wanted camera for one of the taking one."""
         if self.is_identity:
             return picture
         return np.where(self._seen, picture[self._index], np.uint16(0))
-
-
-def _pixels(
-    count: int, c_wanted: float, f_wanted: float, c_taken: float, f_taken: float
-) -> npt.NDArray[np.int64]:
-    ray = (np.arange(count) - c_wanted) / f_wanted
-    pixels: npt.NDArray[np.int64] = np.rint(f_taken * ray + c_taken).astype(np.int64)
-    return pixels

@@ -66,8 +66,7 @@ class StereoModel:
         self._glass = correlated_noise(rng, self._shape, _GLASS_WINDOW)
         self._column = np.arange(config.width, dtype=np.float32)
         row = np.arange(config.height, dtype=np.float32)[:, np.newaxis]
-        self._x = ((self._column - intrinsics.cx) / intrinsics.fx).astype(np.float32)
-        self._y = ((row - intrinsics.cy) / intrinsics.fy).astype(np.float32)
+        self._x, self._y = intrinsics.rays(self._column, row)
 
     @property
     def depth_disparity(self) -> float:

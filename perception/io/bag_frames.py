@@ -6,7 +6,6 @@ of its own:
     python -m perception.io.bag_frames RECORDING FOLDER
 """
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from perception.io.bags import depth_groups, play_apart, rectified_lens
-from perception.io.frames import CAMERA_FILE
+from perception.io.bags import depth_groups, intrinsics_of, play_apart
+from perception.io.camera_file import CAMERA_FILE, write_camera
 
 TIMEOUT = 1800.0
 """A recording that takes longer to unpack is given up, s."""
@@ -52,7 +51,8 @@ def _play(path: str, folder: Path) -> None:
             if time <= last:
                 continue
             if last < 0.0:
-                _write_camera(folder, frame)
+                camera = folder / CAMERA_FILE
+                write_camera(camera, intrinsics_of(frame), frame.get_units())
             color = group.get_color_frame()
             if color:
                 color = align.process(group).get_color_frame()
@@ -63,20 +63,6 @@ def _play(path: str, folder: Path) -> None:
             cv2.imwrite(str(folder / f"rgb/{stamp}.png"), picture, _QUICK_PNG)
             rgb.write(f"{stamp} rgb/{stamp}.png\n")
             dep.write(f"{stamp} depth/{stamp}.png\n")
-
-
-def _write_camera(folder: Path, frame: Any) -> None:
-    lens = rectified_lens(frame)
-    camera = {
-        "width": lens.width,
-        "height": lens.height,
-        "fx": lens.fx,
-        "fy": lens.fy,
-        "cx": lens.ppx,
-        "cy": lens.ppy,
-        "depth_scale_m_per_unit": frame.get_units(),
-    }
-    (folder / CAMERA_FILE).write_text(json.dumps(camera, indent=1) + "\n")
 
 
 def _as_bgr(frame: Any, shape: tuple[int, ...]) -> Any:

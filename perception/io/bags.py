@@ -17,10 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from perception.depth_camera.depth import CameraIntrinsics
 from perception.errors import CloudReadError
 from perception.ground import FloatArray
+from perception.io.camera_file import RecordedCamera
 from perception.io.clouds import check_file, checked_points
-from perception.io.depth_images import MAX_FRAMES, DepthCamera, median_depth
+from perception.io.depth_images import MAX_FRAMES, median_depth
 
 # librealsense records ROS 1 bags, from 2.58 on ROS 2 ones; it plays both.
 BAG_SUFFIXES = (".bag", ".db3")
@@ -49,7 +51,8 @@ def read_bag(path: Path) -> FloatArray:
             depth, numbers = content["depth"], content["camera"]
     height, width = depth.shape
     fx, fy, cx, cy, scale = map(float, numbers)
-    camera = DepthCamera(width, height, fx, fy, cx, cy, scale)
+    intrinsics = CameraIntrinsics(fx, fy, cx, cy, width, height)
+    camera = RecordedCamera(intrinsics, scale)
     return checked_points(path, camera.points(depth))
 
 
@@ -123,12 +126,10 @@ def depth_groups(path: str, *streams: Any) -> Iterator[tuple[Any, Any]]:
         raise ValueError("it has no depth pictures")
 
 
-def rectified_lens(frame: Any) -> Any:
-    """Returns the intrinsics of a depth frame; a ValueError says it is distorted."""
+def intrinsics_of(frame: Any) -> CameraIntrinsics:
+    """Returns the intrinsics of a depth frame; ValueError = it is distorted."""
     lens = frame.profile.as_video_stream_profile().intrinsics
-    if any(lens.coeffs):
-        raise ValueError(f"its depth is distorted ({lens.model}), not rectified")
-    return lens
+    return CameraIntrinsics.from_librealsense(lens)
 
 
 def _play(path: str) -> tuple[Any, Any]:
@@ -138,9 +139,9 @@ def _play(path: str) -> tuple[Any, Any]:
     frames: list[Any] = []
     for frame, _ in itertools.islice(depth_groups(path, rs.stream.depth), MAX_FRAMES):
         scale = frame.get_units()
-        lens = rectified_lens(frame)
+        camera = intrinsics_of(frame)
         frames.append(np.array(frame.get_data()))
-    numbers = [lens.fx, lens.fy, lens.ppx, lens.ppy, scale]
+    numbers = [camera.fx, camera.fy, camera.cx, camera.cy, scale]
     return median_depth(frames), numbers
 
 

@@ -1,6 +1,5 @@
 """RGB-D frames and the folders they are recorded in."""
 
-import json
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -16,6 +15,12 @@ from scipy.spatial.transform import Rotation
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.errors import CloudReadError
 from perception.ground import FloatArray, FrozenValue
+from perception.io.camera_file import (
+    CAMERA_FILE,
+    INTRINSICS_FILE,
+    read_camera,
+    write_camera,
+)
 
 DEPTH_UNITS_PER_M = 5000.0
 """Source: TUM RGB-D benchmark, "File formats": 5000 units of depth are a metre."""
@@ -23,7 +28,6 @@ MAX_TIME_DIFFERENCE = 0.02
 """Colour, depth and pose belong together within this, s; TUM's `associate.py`."""
 MAX_POSE_GAP = 0.1
 """Poses no farther apart than this are interpolated, s."""
-CAMERA_FILE = "camera.json"
 TRUTH_FILE = "groundtruth.txt"
 ARM_FILE = "arm.txt"
 
@@ -146,9 +150,7 @@ def write_recording(
     Returns:
         How many frames there were.
     """
-    names = ("width", "height", "fx", "fy", "cx", "cy")
-    camera = {name: getattr(intrinsics, name) for name in names}
-    (folder / CAMERA_FILE).write_text(json.dumps(camera, indent=1) + "\n")
+    write_camera(folder / CAMERA_FILE, intrinsics)
     for name in ("rgb", "depth"):
         (folder / name).mkdir(exist_ok=True)
     truth, arm = [], []
@@ -218,40 +220,27 @@ def _read_image(path: Path, mode: int) -> npt.NDArray[Any]:
 
 
 def _read_camera(folder: Path) -> tuple[CameraIntrinsics, float | None]:
-    for name in (CAMERA_FILE, "intrinsics.json"):
+    for name in (CAMERA_FILE, INTRINSICS_FILE):
         for parent in (folder, folder.parent):
             if (parent / name).is_file():
-                return _parse_camera(parent / name)
+                return _checked_camera(parent / name)
     raise CloudReadError(
         f"{folder}: no {CAMERA_FILE} (width, height, fx, fy, cx, cy).",
         code="PNT-FRAMES-020",
     )
 
 
-def _parse_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
-    try:
-        fields = json.loads(path.read_text())
-        lengths = {name: float(fields[name]) for name in ("fx", "fy", "cx", "cy")}
-        sizes = {name: int(fields[name]) for name in ("width", "height")}
-        scale = fields.get("depth_scale_m_per_unit")
-        unit_mm = None if scale is None else 1000.0 * float(scale)
-    except (ValueError, TypeError, KeyError) as error:
-        raise CloudReadError(
-            f"{path}: no camera: {error!r}.", code="PNT-FRAMES-021"
-        ) from error
-    for name, value in (sizes | lengths).items():
-        if not (np.isfinite(value) and value > 0):
-            raise CloudReadError(
-                f"{path}: {name} must be > 0, got {value!r}.", code="PNT-FRAMES-022"
-            )
+def _checked_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
+    camera = read_camera(path)
+    intrinsics, scale = camera.intrinsics, camera.depth_scale_m_per_unit
     for name, side in (("cx", "width"), ("cy", "height")):
-        if lengths[name] >= sizes[side]:
+        value, size = getattr(intrinsics, name), getattr(intrinsics, side)
+        if not 0.0 < value < size:
             raise CloudReadError(
-                f"{path}: {name} must be < {side} {sizes[side]}, got {lengths[name]}.",
+                f"{path}: {name} must be > 0 and < {side} {size}, got {value}.",
                 code="PNT-FRAMES-023",
             )
-    camera = CameraIntrinsics(**lengths, width=sizes["width"], height=sizes["height"])
-    return camera, unit_mm
+    return intrinsics, None if scale is None else 1000.0 * scale
 
 
 def _read_list(path: Path) -> tuple[FloatArray, list[Path]]:

@@ -229,8 +229,7 @@ def _cast(
     Returns:
         Depth along C's z (H, W), m, and x and y of what is hit, in T.
     """
-    u = (np.arange(intrinsics.width) - intrinsics.cx) / intrinsics.fx
-    v = (np.arange(intrinsics.height) - intrinsics.cy) / intrinsics.fy
+    u, v = intrinsics.rays(np.arange(intrinsics.width), np.arange(intrinsics.height))
     R = X_WC.rotation().matrix().astype(np.float32)
     p = X_WC.translation()
     rays = [

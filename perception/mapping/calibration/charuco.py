@@ -117,7 +117,7 @@ def calibrate_on_board(
         parts = []
         for X_WC, numbers, uv in views:
             p_CQs = (X_WC @ X_CCm).inverse() @ X_WB @ p_BQs[numbers].T
-            parts.append((_project(p_CQs, intrinsics) - uv).ravel())
+            parts.append((intrinsics.project(p_CQs).T - uv).ravel())
         return np.concatenate(parts)
 
     answer = least_squares(
@@ -142,22 +142,8 @@ def _first_guess(
     intrinsics: CameraIntrinsics,
 ) -> RigidTransform:
     X_WC, numbers, uv = view
-    camera = np.array(
-        [
-            [intrinsics.fx, 0.0, intrinsics.cx],
-            [0.0, intrinsics.fy, intrinsics.cy],
-            [0.0, 0.0, 1.0],
-        ]
-    )
-    _, turn, shift = cv2.solvePnP(p_BQs[numbers], uv, camera, None)
+    _, turn, shift = cv2.solvePnP(p_BQs[numbers], uv, intrinsics.matrix, None)
     return X_WC @ _pose(np.concatenate([turn.ravel(), shift.ravel()]))
-
-
-def _project(p_CQs: FloatArray, intrinsics: CameraIntrinsics) -> FloatArray:
-    x, y, z = p_CQs
-    u = intrinsics.fx * x / z + intrinsics.cx
-    v = intrinsics.fy * y / z + intrinsics.cy
-    return np.stack([u, v], axis=1)
 
 
 def _pose(step: FloatArray) -> RigidTransform:

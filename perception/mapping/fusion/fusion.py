@@ -169,8 +169,7 @@ def _pixels(
     depth_mm, stride = picture.depth_mm, picture.stride
     row, column = np.nonzero(depth_mm)
     z = depth_mm[row, column] / 1000.0
-    x = (stride * column - intrinsics.cx) / intrinsics.fx
-    y = (stride * row - intrinsics.cy) / intrinsics.fy
+    x, y = intrinsics.rays(stride * column, stride * row)
     height, width = keyframe.z.shape
     normals = keyframe.grid(intrinsics).normals[
         np.minimum(stride * row // BLOCK, height - 1),
@@ -267,11 +266,10 @@ def _seen_through(
         picture = keyframe.picture
         if picture is None:
             continue
-        x, y, z = X_WC.inverse() @ p_WQs
-        ahead = np.flatnonzero(z > 0.1)
-        depth_of = z[ahead]
-        u = (intrinsics.fx * x[ahead] / depth_of + intrinsics.cx) / picture.stride
-        v = (intrinsics.fy * y[ahead] / depth_of + intrinsics.cy) / picture.stride
+        p_CQs = X_WC.inverse() @ p_WQs
+        ahead = np.flatnonzero(p_CQs[2] > 0.1)
+        depth_of = p_CQs[2, ahead]
+        u, v = intrinsics.project(p_CQs[:, ahead]) / picture.stride
         height, width = picture.shape
         inside = (u > 0) & (u < width - 1) & (v > 0) & (v < height - 1)
         ahead, z_in = ahead[inside], depth_of[inside]

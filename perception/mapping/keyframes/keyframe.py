@@ -197,9 +197,7 @@ def _on_rays(
 ) -> FloatArray:
     """Returns the points at depth z on the middles of blocks, stacked x, y, z."""
     middle = (BLOCK - 1) / 2.0
-    x = (BLOCK * column + middle - intrinsics.cx) / intrinsics.fx * z
-    y = (BLOCK * row + middle - intrinsics.cy) / intrinsics.fy * z
-    return np.stack([x, y, z])
+    return intrinsics.backproject(BLOCK * column + middle, BLOCK * row + middle, z)
 
 
 def _normals(points: FloatArray, valid: BoolArray) -> FloatArray:
@@ -281,9 +279,7 @@ def find_features(
     column, row = np.rint(uv).astype(int).T
     z = _median_depth(frame.depth_mm)[row, column] / 1000.0
     seen = (z > 0) & (z <= config.max_range)
-    x = (uv[:, 0] - intrinsics.cx) / intrinsics.fx * z
-    y = (uv[:, 1] - intrinsics.cy) / intrinsics.fy * z
-    p_Cs = np.stack([x, y, z], axis=1)
+    p_Cs = np.ascontiguousarray(intrinsics.backproject(uv[:, 0], uv[:, 1], z).T)
     return Features(
         uv[seen], p_Cs[seen], np.asarray(descriptors)[seen].astype(np.uint8)
     )

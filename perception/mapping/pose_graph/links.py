@@ -113,18 +113,11 @@ def constraint_by_appearance(
         return None, len(good)
     first = np.array([match.queryIdx for match in good])
     second = np.array([match.trainIdx for match in good])
-    camera = np.array(
-        [
-            [intrinsics.fx, 0, intrinsics.cx],
-            [0, intrinsics.fy, intrinsics.cy],
-            [0, 0, 1],
-        ]
-    )
     cv2.setRNGSeed(1)
     found, turn, shift, inliers = cv2.solvePnPRansac(
         a.p_Cs[first],
         b.uv[second],
-        camera,
+        intrinsics.matrix,
         None,
         reprojectionError=3.0,
         iterationsCount=200,
@@ -158,7 +151,6 @@ def _refine(
 ) -> tuple[RigidTransform, FloatArray]:
     """Minimises the reprojection error in both pictures and the difference in depth."""
     focal = np.array([intrinsics.fx, intrinsics.fy])
-    middle = np.array([intrinsics.cx, intrinsics.cy])
     information = np.zeros((6, 6))
     for _ in range(4):
         information[:] = 0.0
@@ -180,8 +172,7 @@ def _refine(
         ):
             z = points[:, 2]
             residual = np.empty((len(z), 3))
-            residual[:, :2] = focal * points[:, :2] / z[:, None] + middle
-            residual[:, :2] -= features.uv[index]
+            residual[:, :2] = intrinsics.project(points.T).T - features.uv[index]
             residual[:, 2] = z - features.p_Cs[index, 2]
             project = np.zeros((len(z), 3, 3))
             project[:, 0, 0], project[:, 1, 1] = focal[0] / z, focal[1] / z
@@ -276,9 +267,9 @@ def _correspond(
     """
     R = X_ij.rotation().matrix()
     moved = points @ R.T + X_ij.translation()
-    z = np.maximum(moved[:, 2], 1e-3)
-    column = (intrinsics.fx * moved[:, 0] / z + intrinsics.cx) / BLOCK
-    row = (intrinsics.fy * moved[:, 1] / z + intrinsics.cy) / BLOCK
+    x, y, z = moved.T
+    z = np.maximum(z, 1e-3)
+    column, row = intrinsics.project(np.stack([x, y, z])) / BLOCK
     height, width = a.valid.shape
     inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
     column, row = column[inside].astype(int), row[inside].astype(int)

@@ -39,10 +39,9 @@ def overlap(
     """
     if not keyframe.sample.size:
         return 0.0
-    x, y, z = X_CK @ keyframe.sample.astype(float)
-    z = np.maximum(z, 1e-3)
-    u = intrinsics.fx * x / z + intrinsics.cx
-    v = intrinsics.fy * y / z + intrinsics.cy
+    p_CQs = X_CK @ keyframe.sample.astype(float)
+    p_CQs[2] = np.maximum(p_CQs[2], 1e-3)
+    u, v = intrinsics.project(p_CQs)
     inside = (u >= 0) & (u < intrinsics.width) & (v >= 0) & (v < intrinsics.height)
     return float(inside.mean())
 

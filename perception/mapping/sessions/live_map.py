@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from perception.config import MapConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable_pixels
 from perception.ground import BoolArray, FrozenValue
 from perception.io.frames import DepthImage
 from perception.mapping.config import PoseGraphConfig
@@ -115,7 +115,7 @@ class LiveMap(FrozenValue):
         """
         config, intrinsics = self.voxels.config, self.graph.intrinsics
         usable = usable_pixels(depth_mm, config)
-        p_CQs = backproject(depth_mm, usable, intrinsics, config.stride)
+        p_CQs = depth_points(depth_mm, usable, intrinsics, config.stride)
         graph = self._with_keyframe(time, depth_mm, usable, X_arm)
         thin = ThinPicture.of(depth_mm, usable, config.stride)
         picture = FusedPicture(thin, X_arm, len(graph.keyframes) - 1)
@@ -189,7 +189,7 @@ class LiveMap(FrozenValue):
         for fused in self.pictures:
             k, thin = fused.keyframe, fused.picture
             depth_mm = thin.depth_mm
-            p_CQs = backproject(depth_mm, depth_mm > 0, thin.camera(intrinsics))
+            p_CQs = depth_points(depth_mm, depth_mm > 0, thin.camera(intrinsics))
             X_KC = self._X_WCf(k).inverse() @ fused.X_arm @ self.X_CCm
             X_WC = self.solution.graph.poses[k] @ X_KC
             voxels = voxels.fuse(X_WC @ p_CQs, X_WC.translation())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from perception.config import MapConfig, StereoConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable_pixels
 
 CAMERA = CameraIntrinsics(fx=100.0, fy=110.0, cx=19.5, cy=14.5, width=40, height=30)
 
@@ -23,17 +23,27 @@ def test_stereo_intrinsics_put_the_field_of_view_on_the_picture_borders():
 
 def test_points_project_back_to_their_pixels():
     depth_mm = np.random.default_rng(1).integers(300, 3000, (30, 40)).astype(np.uint16)
-    p_CQs = backproject(depth_mm, np.ones((30, 40), dtype=bool), CAMERA)
+    p_CQs = depth_points(depth_mm, np.ones((30, 40), dtype=bool), CAMERA)
     row, column = np.divmod(np.arange(1200), 40)
     np.testing.assert_allclose(100 * p_CQs[0] / p_CQs[2] + 19.5, column, atol=1e-9)
     np.testing.assert_allclose(110 * p_CQs[1] / p_CQs[2] + 14.5, row, atol=1e-9)
     np.testing.assert_allclose(p_CQs[2], depth_mm.ravel() / 1000.0, atol=1e-12)
 
 
+def test_a_pixel_off_the_axis_shows_a_point_by_similar_triangles():
+    # 50 px right of and 22 px above the principal point: x = 50/100 z, y = -22/110 z.
+    column, row, z = np.array([69.5]), np.array([-7.5]), np.array([2.0])
+    p_CQs = CAMERA.backproject(column, row, z)
+    np.testing.assert_allclose(p_CQs, [[1.0], [-0.4], [2.0]])
+    np.testing.assert_allclose(CAMERA.project(p_CQs), [[69.5], [-7.5]])
+    homogeneous = CAMERA.matrix @ p_CQs
+    np.testing.assert_allclose(homogeneous[:2] / homogeneous[2], [[69.5], [-7.5]])
+
+
 def test_stride_takes_every_so_many_th_usable_pixel():
     usable = np.ones((30, 40), dtype=bool)
     usable[0, 0] = False
-    p_CQs = backproject(wall(), usable, CAMERA, stride=3)
+    p_CQs = depth_points(wall(), usable, CAMERA, stride=3)
     assert p_CQs.shape == (3, 10 * 14 - 1)
     # The first point is pixel (0, 3).
     np.testing.assert_allclose(p_CQs[:, 0], [-0.165 * 0.7, -14.5 / 110 * 0.7, 0.7])
@@ -41,7 +51,7 @@ def test_stride_takes_every_so_many_th_usable_pixel():
 
 def test_pictures_of_another_size_are_refused():
     with pytest.raises(ValueError, match=r"\(30, 40\)"):
-        backproject(np.zeros((3, 3), np.uint16), np.zeros((3, 3), bool), CAMERA)
+        depth_points(np.zeros((3, 3), np.uint16), np.zeros((3, 3), bool), CAMERA)
 
 
 def test_near_side_of_an_edge_loses_half_the_window_and_far_side_one_pixel():

@@ -1,6 +1,6 @@
 import numpy as np
 
-from perception.depth_camera.depth import CameraIntrinsics, backproject
+from perception.depth_camera.depth import CameraIntrinsics, depth_points
 from perception.depth_camera.pinhole import PinholeMap
 
 WANTED = CameraIntrinsics(fx=446.0, fy=446.0, cx=423.5, cy=239.5, width=848, height=480)
@@ -18,7 +18,7 @@ def picture_of(camera):
 
 def test_points_lie_where_they_were():
     mapped = PinholeMap(TAKEN, WANTED).apply(picture_of(TAKEN))
-    x, y, z = backproject(mapped, mapped > 0, WANTED)
+    x, y, z = depth_points(mapped, mapped > 0, WANTED)
     # Half a pixel of the taking camera at 0.7 to 0.9 m on this slope, and 0.5 mm of the
     # picture's rounding.
     half_pixel = 0.5 * z / TAKEN.fx
@@ -27,7 +27,7 @@ def test_points_lie_where_they_were():
 
 
 def test_without_the_map_they_would_not():
-    x, y, z = backproject(picture_of(TAKEN), np.ones((480, 848), dtype=bool), WANTED)
+    x, y, z = depth_points(picture_of(TAKEN), np.ones((480, 848), dtype=bool), WANTED)
     assert np.abs(z - (Z0 + A * x + B * y)).max() > 5e-3
 
 

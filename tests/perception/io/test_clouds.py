@@ -174,7 +174,11 @@ def test_distortion_is_taken_off(tmp_path):
         (np.zeros((3, 4), np.uint8), CAMERA, "expected 16-bit"),
         (np.ones((4, 3), np.uint16), CAMERA, "image is 3 x 4 px, .* is for 4 x 3 px"),
         (np.ones((3, 4), np.uint16), CAMERA | {"fx": -1.0}, "fx must be > 0, got -1.0"),
-        (np.ones((3, 4), np.uint16), {"width": 4}, "height must be a number, got None"),
+        (
+            np.ones((3, 4), np.uint16),
+            {"width": 4},
+            "height must be a whole number, got None",
+        ),
         (np.ones((3, 4), np.uint16), [1, 2], "expected a JSON object"),
         (
             np.ones((3, 4), np.uint16),

@@ -86,11 +86,11 @@ def test_poses_that_are_none_are_refused_by_line(tmp_path):
     ("name", "text", "message"),
     [
         ("camera.json", None, "no camera.json"),
-        ("camera.json", '{"width": 64}', "no camera"),
+        ("camera.json", '{"width": 64}', "height must be a whole number"),
         (
             "camera.json",
             '{"width": 64, "height": 48, "fx": 50, "fy": 50, "cx": 319.5, "cy": 24}',
-            "cx must be < width 64, got 319.5",
+            "cx must be > 0 and < width 64, got 319.5",
         ),
         ("depth.txt", "0.0\n", "lines of time and file"),
         ("rgb.txt", "", "no frames"),

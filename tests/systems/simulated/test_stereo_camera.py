@@ -25,7 +25,7 @@ from painter.systems.simulated.stereo_camera import (
     render_camera_info,
 )
 from perception.config import StereoConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject
+from perception.depth_camera.depth import CameraIntrinsics, depth_points
 
 SMALL = StereoConfig(width=212, height=120)
 
@@ -159,7 +159,7 @@ def test_a_rendered_box_is_where_it_stands():
     simulator.AdvanceTo(0.01)
     context = dut.GetMyContextFromRoot(simulator.get_context())
     depth_mm = dut.GetOutputPort("depth_image").Eval(context).data[:, :, 0]
-    p_CQs = backproject(depth_mm, depth_mm > 0, intrinsics)
+    p_CQs = depth_points(depth_mm, depth_mm > 0, intrinsics)
     front = p_CQs[:, np.abs(p_CQs[2] - 0.6) < 0.002]
     # The outermost pixel centres lie within one pixel, 1.34 mm, inside the edges, so
     # half a pixel of shift of the principal point would show.

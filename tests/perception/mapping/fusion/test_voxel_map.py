@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from perception.config import MapConfig, StereoConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable_pixels
 from perception.depth_camera.stereo import StereoModel
 from perception.mapping.fusion.voxel_map import VoxelMap
 from perception.values import SurfaceMap
@@ -152,7 +152,7 @@ def scanned_plates() -> SurfaceMap:
         depth = depth.astype(np.float32)
         depth_mm = model.measure(depth, depth, np.random.default_rng([1, frame]))
         usable = usable_pixels(depth_mm, config)
-        p_CQs = backproject(depth_mm, usable, intrinsics, config.stride)
+        p_CQs = depth_points(depth_mm, usable, intrinsics, config.stride)
         X_WC = RigidTransform(R_WC, X_WT @ p_TC)
         dut = dut.fuse(X_WC @ p_CQs, X_WC.translation())
     return dut.surface_map

@@ -3,7 +3,7 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from perception.config import MapConfig
-from perception.depth_camera.depth import CameraIntrinsics, backproject, usable_pixels
+from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable_pixels
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.fusion.voxel_map import VoxelMap
 from perception.mapping.sessions.live_map import LiveMap
@@ -65,7 +65,7 @@ def test_a_good_arm_is_believed_to_the_bit():
     for X_WC in places():
         depth_mm = depth_of_wall(X_WC)
         usable = usable_pixels(depth_mm, CONFIG)
-        p_CQs = backproject(depth_mm, usable, CAMERA, CONFIG.stride)
+        p_CQs = depth_points(depth_mm, usable, CAMERA, CONFIG.stride)
         voxels = voxels.fuse(X_WC @ p_CQs, X_WC.translation())
     assert dut.moved_by < 3e-4  # What rounding to mm and its planes come to.
     np.testing.assert_array_equal(dut.surface_map.p_WQs, voxels.surface_map.p_WQs)
