@@ -8,22 +8,57 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
+from perception.ground import (
+    BoolArray,
+    FloatArray,
+    FrozenValue,
+    IntArray,
+    check_positive,
+)
+
+
+@dataclass(frozen=True)
+class TileSize:
+    """Size of the tile, the part of the wall that one job covers.
+
+    Attributes:
+        width: Along T x, m.
+        height: Along T y, m.
+    """
+
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        """Raises ValueError if a side is not a positive number."""
+        check_positive("tile", width=self.width, height=self.height)
+
+    @property
+    def p_TC(self) -> FloatArray:
+        """The tile's centre, (3,) m, in T."""
+        return np.array([self.width / 2.0, self.height / 2.0, 0.0])
+
+    def shape(self, cell: float) -> tuple[int, int]:
+        """Returns (ny, nx) of the grid over the tile with cells of edge `cell`, m."""
+        return round(self.height / cell), round(self.width / cell)
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceMap(FrozenValue):
-    """Fused surface points, one a voxel, as the map accumulator gives them out.
+    """Surface points, one a voxel, as the map accumulator gives them out.
 
     Attributes:
         p_WQs: (3, N) float64, m, in W.
-        normals_W: (3, N) float32, unit, in W, towards the camera that saw the point.
-        counts: (N,) int64, depth pixels fused into the point.
-        variances: (N,) float32, m², of the depth along the map's z axis.
+        normals_W: (3, N) float32, unit, in W, towards the camera that saw the point;
+            empty = unknown.
+        counts: (N,) int64, depth pixels fused into the point; empty = unknown.
+        variances: (N,) float32, m², of the depth of one pixel along the map's z axis;
+            empty = unknown.
         frames: Depth images fused so far.
-        p_WCs: (3, frames) float64, m, in W: where they were taken; empty = unknown.
-        mount_tilt: Angle by which the pictures show the camera's mount to be tilted
-            against its model, rad; the points are where they are all the same.
+        p_WCs: (3, frames) float64, m, in W: camera centres of these images; empty =
+            unknown.
+        mount_tilt: Angle between the camera's mount as the images show it and its
+            model, rad; the points are not affected.
     """
 
     p_WQs: FloatArray
@@ -45,6 +80,11 @@ class SurfaceMap(FrozenValue):
             frames=0,
         )
 
+    @classmethod
+    def of_points(cls, p_WQs: FloatArray) -> Self:
+        """Makes a map of points alone, (3, N) m, in W; nothing else is known."""
+        return cls.empty().replace(p_WQs=p_WQs)
+
 
 @dataclass(frozen=True, eq=False)
 class Wall(FrozenValue):
@@ -55,7 +95,7 @@ class Wall(FrozenValue):
             robot, x right, y up, z out of the wall towards the robot.
         rms: Root mean square distance of the inliers from the plane, m.
         inlier_count: Points within the distance threshold of the plane.
-        inlier_share: The same as a share of all points looked at.
+        inlier_share: The same as a share of all points searched.
     """
 
     X_WT: RigidTransform

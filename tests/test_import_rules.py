@@ -72,11 +72,13 @@ ROOMS: dict[str, set[str]] = {
         "perception.fine_steps",
         "perception.paper_steps",
         "perception.segmentation",
+        "perception.values",
     },
     "perception.synthetic": {
         "perception.config",
         "perception.depth_camera",
         "perception.io",
+        "perception.values",
     },
     "perception.mapping.config": set(),
     "perception.mapping.keyframes": {

@@ -29,6 +29,7 @@ from perception.depth_camera.depth import CameraIntrinsics, depth_points, usable
 from perception.depth_camera.stereo import StereoModel
 from perception.mapping.fusion.voxel_map import VoxelMap
 from perception.segmentation import segment_wall
+from perception.values import TileSize
 
 STEPS_MM = (-20, 5, 7, 10, 15, 20, 40)
 DISTANCES = (0.5, 0.7, 0.75, 0.8, 1.0, 1.25, 1.5)
@@ -82,16 +83,12 @@ def measure(
             depth_mm, usable_pixels(depth_mm, config), intrinsics, config.stride
         )
         voxels = voxels.fuse(RigidTransform(R_TC, p_TC) @ p_CQs, p_TC)
-    surface = voxels.surface_map
     result = segment_wall(
-        surface.p_WQs,
+        voxels.surface_map,
         RigidTransform(),
-        width=WIDTH,
-        height=HEIGHT,
+        TileSize(WIDTH, HEIGHT),
         config=SegmentationConfig(),
         seed=1,
-        counts=surface.counts,
-        variances=surface.variances,
     )
     ny, nx = result.labels.shape
     p_TQs = [(np.arange(count) + 0.5) * result.cell for count in (nx, ny)]

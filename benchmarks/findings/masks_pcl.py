@@ -25,14 +25,14 @@ from perception.paper_steps.pipeline import find_planes, segment_tile
 from perception.paper_steps.wall import choose_plane, wall_on_plane
 from perception.segmentation import segment_wall
 from perception.synthetic.furnished_wall import (
-    EDGE,
+    TILE,
     FurnishedWall,
     Thing,
     furnished_wall,
 )
+from perception.values import SurfaceMap
 
 POINTS = (100_000, 500_000, 1_000_000)
-SIZE = {"width": EDGE, "height": EDGE}
 THINGS = tuple(thing for thing in Thing if thing)
 
 
@@ -40,11 +40,13 @@ def masks(wall: FurnishedWall, program: str) -> dict[str, BoolArray]:
     """Returns the masks of one cloud by what made them."""
     config = SegmentationConfig()
     found = find_planes(wall.p_CQs, config=config, seed=0)
-    size = {**SIZE, "total": found.kept_count}
-    number = choose_plane(found.planes, wall.X_CT, **size, config=config)
-    plane = wall_on_plane(found.planes[number], wall.X_CT, **size)
-    tile = segment_tile(found, plane, number + 1, **SIZE, config=config)
-    whole = segment_wall(wall.p_CQs, wall.X_CT, **SIZE, config=config, seed=0)
+    total = found.kept_count
+    number = choose_plane(found.planes, wall.X_CT, TILE, total=total, config=config)
+    plane = wall_on_plane(found.planes[number], wall.X_CT, TILE, total=total)
+    tile = segment_tile(found, plane, number + 1, TILE, config=config)
+    whole = segment_wall(
+        SurfaceMap.of_points(wall.p_CQs), wall.X_CT, TILE, config=config, seed=0
+    )
     result = {
         "paper's steps": tile.segmentation.wall_mask,
         "segment_wall": whole.wall_mask,

@@ -32,7 +32,8 @@ from painter.cycle.true_wall import true_segmentation
 from painter.resources import models_path
 from painter.robot.planners import MakeProgramPlanner
 from perception.segmentation import segment_wall
-from perception.synthetic.furnished_wall import EDGE, furnished_wall
+from perception.synthetic.furnished_wall import TILE, furnished_wall
+from perception.values import SurfaceMap
 
 SECONDS = 20.0
 POINTS = 500_000
@@ -198,10 +199,9 @@ def work(working: Event, done: Event) -> None:
     count, start = 0, time.monotonic()
     while not done.is_set():
         segment_wall(
-            wall.p_CQs,
+            SurfaceMap.of_points(wall.p_CQs),
             wall.X_CT,
-            width=EDGE,
-            height=EDGE,
+            TILE,
             config=scenario.segmentation,
             seed=1,
         )

@@ -43,17 +43,16 @@ from perception.paper_steps.pipeline import find_planes, segment_tile
 from perception.paper_steps.planes import segment_planes
 from perception.paper_steps.wall import choose_plane, wall_on_plane
 from perception.synthetic.furnished_wall import (
-    EDGE,
+    TILE,
     FurnishedWall,
     Thing,
     furnished_wall,
 )
-from perception.values import Wall
+from perception.values import SurfaceMap, Wall
 
 POINTS = (100_000, 250_000, 500_000, 1_000_000, 3_000_000)
 ORDERED = 1_000_000
 MOST_FOR_PEERS = 1_000_000
-SIZE = {"width": EDGE, "height": EDGE}
 OURS = {"exact": False, "fast filter": True}  # Name, and whether the filter is fast.
 COLUMNS = (*STEPS, "total", "cpu", "refine", "whole", "MB")
 
@@ -86,15 +85,17 @@ def run_ours(
     with timed(times, "total"):
         found = find_planes(p_CQs, config=config, seed=0)
         with timed(times, "tile"):
-            size = {**SIZE, "total": found.kept_count}
-            number = choose_plane(found.planes, wall.X_CT, **size, config=config)
-            plane = wall_on_plane(found.planes[number], wall.X_CT, **size)
-            steps = segment_tile(found, plane, number + 1, **SIZE, config=config)
+            total = found.kept_count
+            number = choose_plane(
+                found.planes, wall.X_CT, TILE, total=total, config=config
+            )
+            plane = wall_on_plane(found.planes[number], wall.X_CT, TILE, total=total)
+            stages = segment_tile(found, plane, number + 1, TILE, config=config)
     times["cpu"] = time.process_time() - cpu
     points = found.p_WQs.compress(found.kept, axis=1)
     with timed(times, "refine"):
-        p_TQs = plane.X_WT.inverse() @ points
-        fine = refine_segmentation(steps.segmentation, p_TQs, config=config, seed=0)
+        kept = SurfaceMap.of_points(points)
+        fine = refine_segmentation(stages.segmentation, kept, config=config, seed=0)
     times["MB"] = (memory("VmHWM") - before) / 1e6
     times["whole"] = times["total"] + times["refine"]
     with timed(times, "planes"):
@@ -106,7 +107,7 @@ def run_ours(
             rng=np.random.default_rng(0),
         )
     times["filter"] = times["total"] - times["tile"] - times["planes"]
-    coarse = steps.segmentation.wall_mask
+    coarse = stages.segmentation.wall_mask
     return times, Outcome(found.kept, plane, coarse, fine.wall_mask)
 
 
@@ -184,7 +185,7 @@ def print_agreement(
         length = np.linalg.norm(normal)
         z_C = exact.wall.X_WT.rotation().matrix()[:, 2]
         tilt = math.asin(np.linalg.norm(np.cross(normal, z_C)) / length)
-        middle = exact.wall.X_WT @ np.array([EDGE / 2, EDGE / 2, 0.0])
+        middle = exact.wall.X_WT @ TILE.p_TC
         off = abs(normal @ middle + offset) / length
         print(f"; wall plane: {1e3 * off:.3f} mm, {math.degrees(tilt):.4f} deg", end="")
         masks["PCL"] = peer.wall_mask("PCL")

@@ -20,7 +20,8 @@ from painter.config import load_scenario
 from painter.robot.planners import MakeProgramPlanner
 from perception.config import SegmentationConfig
 from perception.segmentation import segment_wall
-from perception.synthetic.furnished_wall import EDGE, furnished_wall
+from perception.synthetic.furnished_wall import TILE, furnished_wall
+from perception.values import SurfaceMap
 
 SCENES = (
     "blank",
@@ -69,10 +70,9 @@ def hashes(scenes: Iterable[str]) -> Iterator[tuple[str, str]]:
     for seed in CLOUDS:
         wall = furnished_wall(100_000, seed=seed)
         found = segment_wall(
-            wall.p_CQs,
+            SurfaceMap.of_points(wall.p_CQs),
             wall.X_CT,
-            width=EDGE,
-            height=EDGE,
+            TILE,
             config=SegmentationConfig(),
             seed=seed,
         )

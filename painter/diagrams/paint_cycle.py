@@ -30,7 +30,7 @@ from painter.systems.brain.wall_finder import WallFinder
 from painter.systems.brain.wall_segmenter import WallSegmenter
 from painter.systems.simulated.paint_film import FilmState
 from perception.depth_camera.depth import CameraIntrinsics
-from perception.values import Wall
+from perception.values import TileSize, Wall
 
 if TYPE_CHECKING:  # Simulation runs without the robot's packages.
     from painter.diagrams.hardware_station import RobotConnection
@@ -182,8 +182,7 @@ def _AddPerception(
 ) -> tuple[WallFinder, WallSegmenter]:
     """Adds the stages that find and segment the wall in the map."""
     settings: dict[str, Any] = {
-        "width": scenario.tile.width,
-        "height": scenario.tile.height,
+        "tile": TileSize(scenario.tile.width, scenario.tile.height),
         "config": scenario.segmentation,
         "seed": scenario.random_seed,
         "period": scenario.cycle.period,

@@ -20,7 +20,7 @@ from perception.fine_steps.votes import point_votes, wall_share
 from perception.fine_steps.wall_surface import fit_wall_surface
 from perception.ground import BoolArray, FloatArray, IntArray
 from perception.paper_steps.regions import drop_specks, sort_by_area
-from perception.values import WallSegmentation
+from perception.values import SurfaceMap, WallSegmentation
 
 Grid = TypeVar("Grid", BoolArray, IntArray, FloatArray)
 
@@ -34,11 +34,8 @@ _GAP_CONFIDENCE = 0.5  # Of what is only filled in between points.
 
 def refine_segmentation(
     coarse: WallSegmentation,
-    p_TQs: FloatArray,
+    surface_map: SurfaceMap,
     *,
-    counts: IntArray | None = None,
-    variances: FloatArray | None = None,
-    p_TCs: FloatArray | None = None,
     config: SegmentationConfig,
     seed: int,
 ) -> WallSegmentation:
@@ -50,10 +47,8 @@ def refine_segmentation(
 
     Args:
         coarse: Result of the paper's steps.
-        p_TQs: (3, N) m, in T: the points it was made of, outliers left out.
-        counts: (N,) measurements in each point; all alike if left out.
-        variances: (N,) m², of one measurement of each point; unknown if left out.
-        p_TCs: (3, k) m, in T, where the pictures were taken; unknown if left out.
+        surface_map: The points it was made of, in W, outliers left out. Without counts
+            all weigh the same.
         config: Thresholds.
         seed: Of RANSAC's random triples.
 
@@ -64,16 +59,19 @@ def refine_segmentation(
     Raises:
         NoWallError: No part of the tile is level with a common surface.
     """
+    X_TW = coarse.X_WT.inverse()
+    p_TQs = X_TW @ surface_map.p_WQs
+    p_WCs = surface_map.p_WCs
+    counts, variances = surface_map.counts, surface_map.variances
     cell = coarse.cell
     ny, nx = coarse.labels.shape
     spacing = _spacing(p_TQs, coarse, config)
     split = min(max(round(cell / spacing), _SPLITS[0]), _SPLITS[1])
     fine = sub_cells(
         p_TQs,
-        counts=counts,
-        variances=variances,
-        width=nx * cell,
-        height=ny * cell,
+        counts=counts if counts.size else None,
+        variances=variances.astype(np.float64) if variances.size else None,
+        shape=(ny, nx),
         cell=cell,
         split=split,
         spacing=spacing,
@@ -104,6 +102,7 @@ def refine_segmentation(
     mask = drop_specks(~off & ~hole, min_area=config.min_region_area, cell=cell)
     side = np.where(residual >= 0.0, Reason.RAISED, Reason.RECESSED)
     reason = np.where(off, side, Reason.SPECK)
+    p_TCs = X_TW @ p_WCs if p_WCs.size else None
     reason = explain(reason, residual, hole, cell=cell, p_TCs=p_TCs)
     openings = find_openings(reason, residual, cell=cell)
     reason[mask] = Reason.WALL

@@ -7,6 +7,7 @@ from scipy.ndimage import distance_transform_edt
 
 from perception.fine_steps.unseen import close_gaps, in_shadow
 from perception.ground import BoolArray, FloatArray, FrozenValue
+from perception.values import TileSize
 
 _RAISED = 0.02
 """What stands so far before the wall hides more than the width of a cell, m."""
@@ -34,9 +35,8 @@ class Relief(FrozenValue):
 def find_relief(
     p_TQs: FloatArray,
     p_TCs: FloatArray,
+    tile: TileSize,
     *,
-    width: float,
-    height: float,
     cell: float,
 ) -> Relief:
     """Lays a map on the tile's grid and finds the wall in shadow.
@@ -44,11 +44,10 @@ def find_relief(
     Args:
         p_TQs: (3, N) m, in T: surface points, denser than the grid.
         p_TCs: (3, k) m, in T, where the pictures were taken.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        tile: Its size.
         cell: Edge of a cell, m.
     """
-    nx, ny = (round(length / cell) for length in (width, height))
+    ny, nx = tile.shape(cell)
     columns, rows = np.floor(p_TQs[:2] / cell).astype(np.int64)
     inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
     top = np.full((ny, nx), -np.inf)

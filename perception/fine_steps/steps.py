@@ -70,8 +70,7 @@ def sub_cells(
     *,
     counts: IntArray | None,
     variances: FloatArray | None,
-    width: float,
-    height: float,
+    shape: tuple[int, int],
     cell: float,
     split: int,
     spacing: float,
@@ -87,13 +86,12 @@ def sub_cells(
         p_TQs: (3, N) m, in T.
         counts: (N,) measurements in each point; all alike if left out.
         variances: (N,) m², of one measurement of each point.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        shape: (ny, nx) cells of the tile.
         cell: Edge of a cell, m.
         split: Sub-cells along a cell's edge.
         spacing: Typical distance of points, m.
     """
-    nx, ny = (split * round(length / cell) for length in (width, height))
+    ny, nx = (split * count for count in shape)
     columns, rows = np.floor(p_TQs[:2] * (split / cell)).astype(np.int64)
     inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
     own = (rows * nx + columns)[inside]

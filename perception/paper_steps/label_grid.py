@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from perception.ground import FloatArray, FrozenValue, IntArray
+from perception.values import TileSize
 
 NOTHING = -1  # Label of a cell without a point; 0 is a point of no plane.
 # Depths are summed in these steps, m: 2^53 of them, as many as a float counts exactly,
@@ -31,9 +32,8 @@ class LabelGrid(FrozenValue):
 def label_grid(
     p_TQs: FloatArray,
     labels: IntArray,
+    tile: TileSize,
     *,
-    width: float,
-    height: float,
     cell: float,
     hidden: float = math.inf,
 ) -> LabelGrid:
@@ -68,20 +68,21 @@ def label_grid(
     Args:
         p_TQs: (3, N) finite, m, in T; points beside the tile are left out.
         labels: (N,) of the points, >= 0.
-        width: Of the tile, m, along T x.
-        height: Of the tile, m, along T y.
+        tile: Its size.
         cell: Edge of a cell, m.
         hidden: Points deeper than the foremost of their cell by more are left out, m.
 
     Returns:
-        The grid, (round(height / cell), round(width / cell)).
+        The grid, of the shape `tile.shape(cell)`.
 
     Raises:
         ValueError: The tile is smaller than a cell.
     """
-    nx, ny = round(width / cell), round(height / cell)
+    ny, nx = tile.shape(cell)
     if nx < 1 or ny < 1:
-        raise ValueError(f"a tile of {width} x {height} m has no cell of {cell} m.")
+        raise ValueError(
+            f"a tile of {tile.width} x {tile.height} m has no cell of {cell} m."
+        )
     size = nx * ny
     # Axis by axis, whatever the caller's order.
     columns, rows = np.ascontiguousarray(p_TQs[:2]) / cell

@@ -19,7 +19,7 @@ from perception.paper_steps.regions import (
     sort_by_area,
 )
 from perception.paper_steps.wall import finite_points
-from perception.values import Wall, WallSegmentation
+from perception.values import TileSize, Wall, WallSegmentation
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +108,8 @@ def segment_tile(
     found: FoundPlanes,
     wall: Wall,
     wall_plane: int,
+    tile: TileSize,
     *,
-    width: float,
-    height: float,
     config: SegmentationConfig,
 ) -> SegmentationStages:
     """Does steps 3 to 6 on the tile of a wall.
@@ -122,8 +121,7 @@ def segment_tile(
         found: Filtered cloud and planes.
         wall: The wall, with the tile.
         wall_plane: Label of its plane.
-        width: Of the tile, m, along T x.
-        height: Of the tile, m, along T y.
+        tile: Its size.
         config: Thresholds of the steps.
 
     Returns:
@@ -132,11 +130,11 @@ def segment_tile(
     Raises:
         NoWallError: No region of the wall's plane is on the tile.
     """
-    size = {"width": width, "height": height, "cell": config.cell}
     grid = label_grid(
         wall.X_WT.inverse() @ found.p_WQs.compress(found.kept, axis=1),
         found.labels.compress(found.kept),
-        **size,
+        tile,
+        cell=config.cell,
         hidden=config.cluster_tolerance,
     )
     clusters = euclidean_clusters(grid, tolerance=config.cluster_tolerance)
@@ -152,7 +150,7 @@ def segment_tile(
     if not wall_mask.any():
         raise NoWallError(
             f"the wall's plane has no region of {config.min_region_area:g} m² on the "
-            f"{width:g} x {height:g} m tile.",
+            f"{tile.width:g} x {tile.height:g} m tile.",
             code="PNT-WALL-003",
         )
     segmentation = WallSegmentation(

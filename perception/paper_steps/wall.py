@@ -10,23 +10,22 @@ from perception.config import SegmentationConfig
 from perception.errors import AmbiguousWallError, NoWallError, ObliqueWallError
 from perception.ground import BoolArray, FloatArray
 from perception.paper_steps.planes import Plane, segment_planes
-from perception.values import Wall
+from perception.values import TileSize, Wall
 
 MIN_POINTS = 100  # Fewer are a stray return, not a surface.
 _STEEPEST = math.radians(80.0)  # Beyond, the centre line runs along the plane.
 _LEVEL = math.cos(math.radians(30.0))  # Planes closer to level are floors.
 _EQUAL = 0.8  # A plane worth this share of the best is as good.
-# Inlier distance at first sight, m. Two looks show little of the wall: within the
-# paper's 3 cm a plane aslant through wall, door and boxes gathers more points than it.
-_FIRST_SIGHT_THRESHOLD = 0.01
+# Inlier distance of the first look, m. Two pictures show little of the wall: within the
+# paper's 3 cm a plane aslant through wall, door and boxes has more inliers than it.
+_FIRST_LOOK_THRESHOLD = 0.01
 
 
 def find_wall(
     p_WQs: FloatArray,
     X_WT_expected: RigidTransform,
+    tile: TileSize,
     *,
-    width: float,
-    height: float,
     config: SegmentationConfig,
     seed: int,
     up_W: FloatArray | None = None,
@@ -39,8 +38,7 @@ def find_wall(
     Args:
         p_WQs: (3, N) m, in W; non-finite points are dropped.
         X_WT_expected: Tile frame where the job expects it.
-        width: Of the tile, m, along T x.
-        height: Of the tile, m, along T y.
+        tile: Its size.
         config: Thresholds.
         seed: Of RANSAC's random triples.
         up_W: (3,) unit, against gravity; see `choose_plane`.
@@ -55,27 +53,16 @@ def find_wall(
     p_WQs = p_WQs[:, finite_points(p_WQs)]
     _, planes = segment_planes(
         p_WQs,
-        threshold=min(config.distance_threshold, _FIRST_SIGHT_THRESHOLD),
+        threshold=min(config.distance_threshold, _FIRST_LOOK_THRESHOLD),
         stop_fraction=config.stop_fraction,
         max_planes=config.max_planes,
         rng=np.random.default_rng(seed),
     )
+    total = p_WQs.shape[1]
     number = choose_plane(
-        planes,
-        X_WT_expected,
-        width=width,
-        height=height,
-        total=p_WQs.shape[1],
-        config=config,
-        up_W=up_W,
+        planes, X_WT_expected, tile, total=total, config=config, up_W=up_W
     )
-    return wall_on_plane(
-        planes[number],
-        X_WT_expected,
-        width=width,
-        height=height,
-        total=p_WQs.shape[1],
-    )
+    return wall_on_plane(planes[number], X_WT_expected, tile, total=total)
 
 
 def finite_points(p_WQs: FloatArray) -> BoolArray:
@@ -102,22 +89,21 @@ def finite_points(p_WQs: FloatArray) -> BoolArray:
 
 
 def deviation(
-    plane: Plane, X_WT_expected: RigidTransform, *, width: float, height: float
+    plane: Plane, X_WT_expected: RigidTransform, tile: TileSize
 ) -> tuple[float, float]:
     """Compares a plane with the expected wall.
 
     Args:
         plane: In W.
         X_WT_expected: Tile frame where the job expects it.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        tile: Its size.
 
     Returns:
         How far the plane lies from the expected tile's centre along T z, m, positive
         towards the robot (infinite for a plane nearly along T z); and the angle of the
         normals, rad, 0 to pi/2.
     """
-    p_WC = X_WT_expected @ np.array([width / 2.0, height / 2.0, 0.0])
+    p_WC = X_WT_expected @ tile.p_TC
     slope = float(plane.normal @ X_WT_expected.rotation().matrix()[:, 2])
     angle = math.acos(min(1.0, abs(slope)))
     if angle > _STEEPEST:
@@ -128,9 +114,8 @@ def deviation(
 def choose_plane(
     planes: Sequence[Plane],
     X_WT_expected: RigidTransform,
+    tile: TileSize,
     *,
-    width: float,
-    height: float,
     total: int,
     config: SegmentationConfig,
     up_W: FloatArray | None = None,
@@ -144,12 +129,11 @@ def choose_plane(
     Args:
         planes: In W.
         X_WT_expected: Tile frame where the job expects it.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        tile: Its size.
         total: Points of the cloud.
         config: Tolerances.
         up_W: (3,) unit, against gravity; planes nearly level are floor or ceiling and
-            no wall. Not looked at if left out.
+            no wall. None = level planes count, too.
 
     Returns:
         Index of the best plane within the tolerances.
@@ -167,10 +151,7 @@ def choose_plane(
         for plane in planes
         if up_W is None or abs(float(plane.normal @ up_W)) < _LEVEL
     ]
-    offs = {
-        id(plane): deviation(plane, X_WT_expected, width=width, height=height)
-        for plane in planes
-    }
+    offs = {id(plane): deviation(plane, X_WT_expected, tile) for plane in planes}
 
     def worth(plane: Plane) -> float:
         return plane.count * math.exp(-2.0 * (offs[id(plane)][0] / limit) ** 2)
@@ -225,9 +206,8 @@ def choose_plane(
 def wall_on_plane(
     plane: Plane,
     X_WT_expected: RigidTransform,
+    tile: TileSize,
     *,
-    width: float,
-    height: float,
     total: int,
 ) -> Wall:
     """Makes the wall of a plane: its tile frame and its figures.
@@ -239,21 +219,19 @@ def wall_on_plane(
     Args:
         plane: In W.
         X_WT_expected: Tile frame where the job expects it.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        tile: Its size.
         total: Points of the cloud.
 
     Returns:
         The wall.
     """
     expected = X_WT_expected.rotation().matrix()
-    distance, _ = deviation(plane, X_WT_expected, width=width, height=height)
-    p_TC = np.array([width / 2.0, height / 2.0, 0.0])
-    p_WC = X_WT_expected @ p_TC + distance * expected[:, 2]
+    distance, _ = deviation(plane, X_WT_expected, tile)
+    p_WC = X_WT_expected @ tile.p_TC + distance * expected[:, 2]
     normal = plane.normal * np.sign(plane.normal @ expected[:, 2])
     R_WT = upright_rotation(normal, expected[:, 1])
     return Wall(
-        X_WT=RigidTransform(R_WT, p_WC - R_WT @ p_TC),
+        X_WT=RigidTransform(R_WT, p_WC - R_WT @ tile.p_TC),
         rms=plane.rms,
         inlier_count=plane.count,
         inlier_share=plane.count / total,

@@ -131,7 +131,7 @@ def fitting_cell(p_TQs: FloatArray, *, least: float) -> float:
     return steps[0] if steps else _CELL_STEPS[-1] * least
 
 
-def clear_feet(steps: SegmentationStages, *, limit: float) -> SegmentationStages:
+def clear_feet(stages: SegmentationStages, *, limit: float) -> SegmentationStages:
     """Takes the feet of obstacles out of the mask.
 
     What stands on a wall has sides. Seen at a slant they are narrow strips, too small
@@ -140,15 +140,15 @@ def clear_feet(steps: SegmentationStages, *, limit: float) -> SegmentationStages
     belong to it.
 
     Args:
-        steps: The segmentation.
+        stages: The segmentation.
         limit: Largest distance of the wall's points from its plane, m.
 
     Returns:
         The segmentation with these cells not in the mask.
     """
-    result = steps.segmentation
+    result = stages.segmentation
     ny, nx = result.wall_mask.shape
-    p_TQs = result.X_WT.inverse() @ steps.found.p_WQs[:, steps.found.kept]
+    p_TQs = result.X_WT.inverse() @ stages.found.p_WQs[:, stages.found.kept]
     columns, rows = np.floor(p_TQs[:2] / result.cell).astype(np.int64)
     inside = (columns >= 0) & (columns < nx) & (rows >= 0) & (rows < ny)
     cells = rows[inside] * nx + columns[inside]
@@ -159,29 +159,29 @@ def clear_feet(steps: SegmentationStages, *, limit: float) -> SegmentationStages
     foot = binary_propagation(
         obstacle, np.ones((3, 3)), mask=obstacle | raised.reshape(ny, nx)
     )
-    return steps.replace(
+    return stages.replace(
         segmentation=result.replace(wall_mask=result.wall_mask & ~foot)
     )
 
 
-def close_gaps(steps: SegmentationStages) -> SegmentationStages:
+def close_gaps(stages: SegmentationStages) -> SegmentationStages:
     """Adds gaps between points to the mask: unseen, one or two cells wide, in the wall.
 
     Args:
-        steps: The segmentation of a cloud whose points are about a cell apart.
+        stages: The segmentation of a cloud whose points are about a cell apart.
 
     Returns:
         The segmentation with these cells in the mask.
     """
-    result = steps.segmentation
+    result = stages.segmentation
     padded = np.pad(result.wall_mask, 2)  # Closing would wear the border off.
     closed = binary_closing(padded, np.ones((3, 3)))[2:-2, 2:-2]
     mask = result.wall_mask | (closed & (result.labels == 0))
-    return steps.replace(segmentation=result.replace(wall_mask=mask))
+    return stages.replace(segmentation=result.replace(wall_mask=mask))
 
 
 def set_back_wall(
-    steps: SegmentationStages, *, set_back: float
+    stages: SegmentationStages, *, set_back: float
 ) -> tuple[SegmentationStages, float]:
     """Adds parts of a wall that lie behind its plane, such as dormers, to the mask.
 
@@ -191,22 +191,22 @@ def set_back_wall(
     wall, as a window or a door is.
 
     Args:
-        steps: The segmentation.
+        stages: The segmentation.
         set_back: How far behind, m.
 
     Returns:
         The segmentation with these parts in the mask, and their area, m².
     """
-    result = steps.segmentation
+    result = stages.segmentation
     normal_T = result.X_WT.rotation().matrix()[:, 2]
     wall = result.wall_mask
     least = _LEAST_SHARE * np.count_nonzero(wall)
     between = _between(wall, axis=1) | _between(wall, axis=0)
     mask = wall.copy()
-    for number, plane in enumerate(steps.found.planes, start=1):
+    for number, plane in enumerate(stages.found.planes, start=1):
         if abs(float(plane.normal @ normal_T)) < _PARALLEL:
             continue
-        for label in np.unique(result.labels[steps.grid.labels == number]):
+        for label in np.unique(result.labels[stages.grid.labels == number]):
             region = (result.labels == label) & ~wall
             seen = region & np.isfinite(result.depth)
             if label == 0 or np.count_nonzero(seen) < max(least, 1):
@@ -218,7 +218,7 @@ def set_back_wall(
     reason = result.reason
     if reason is not None:
         reason = np.where(mask, Reason.WALL, reason).astype(np.uint8)
-    return steps.replace(
+    return stages.replace(
         segmentation=result.replace(wall_mask=mask, reason=reason)
     ), area
 

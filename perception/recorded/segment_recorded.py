@@ -29,9 +29,10 @@ from perception.recorded.recorded_tile import (
     side_of_view,
 )
 from perception.recorded.wall_choice import choose_wall
+from perception.values import SurfaceMap, TileSize
 
 MAX_CELLS = 4_000_000
-MAX_FINE_CELLS = 400_000  # Of which each is looked at in up to 16 parts.
+MAX_FINE_CELLS = 400_000  # Each is split into up to 16 sub-cells.
 # Points farther than this from the median are no part of any wall a robot paints, and
 # such numbers leave no digits for the rest.
 _STRAY = 1000.0
@@ -46,14 +47,14 @@ class RecordedWall(FrozenValue):
     """What was found in a recording.
 
     Attributes:
-        steps: The segmentation with its intermediate results.
+        stages: The segmentation with its intermediate results.
         side: On which side of the wall the sensor was, and how that is known.
         inlier_distance: Of the wall's points, m.
         strays: Points that were left out because they are over a kilometre away.
         set_back_area: Of the mask that is wall behind the main plane, m².
     """
 
-    steps: SegmentationStages
+    stages: SegmentationStages
     side: ViewSide
     inlier_distance: float
     strays: int
@@ -146,30 +147,29 @@ def segment_recorded(
             code="PNT-WALL-008",
         )
     # An extent from the data is a whole number of cells.
-    tile = {
-        "width": size[0] if width is not None else _whole(size[0], cell),
-        "height": size[1] if height is not None else _whole(size[1], cell),
-    }
-    corner = middle - [tile["width"] / 2.0, tile["height"] / 2.0, 0.0]
-    X_WT = RigidTransform(R_WT, R_WT @ corner)
-    wall = wall_on_plane(plane, X_WT, **tile, total=found.kept_count)
+    tile = TileSize(
+        width=size[0] if width is not None else _whole(size[0], cell),
+        height=size[1] if height is not None else _whole(size[1], cell),
+    )
+    X_WT = RigidTransform(R_WT, R_WT @ (middle - tile.p_TC))
+    wall = wall_on_plane(plane, X_WT, tile, total=found.kept_count)
     config = dataclasses.replace(config, cell=cell, distance_threshold=limit)
-    steps = segment_tile(found, wall, number + 1, **tile, config=config)
+    stages = segment_tile(found, wall, number + 1, tile, config=config)
     if fine:
-        p_TQs = wall.X_WT.inverse() @ found.p_WQs[:, found.kept]
+        kept = SurfaceMap.of_points(found.p_WQs[:, found.kept])
         result = refine_segmentation(
-            steps.segmentation, p_TQs, config=config, seed=seed
+            stages.segmentation, kept, config=config, seed=seed
         )
-        steps = steps.replace(segmentation=result)
+        stages = stages.replace(segmentation=result)
     else:
-        steps = clear_feet(steps, limit=limit)
+        stages = clear_feet(stages, limit=limit)
     area = 0.0
     if set_back > 0.0:
-        steps, area = set_back_wall(steps, set_back=set_back)
+        stages, area = set_back_wall(stages, set_back=set_back)
     if cell > least_cell and not fine:
-        steps = close_gaps(steps)
+        stages = close_gaps(stages)
     return RecordedWall(
-        steps=steps,
+        stages=stages,
         side=side,
         inlier_distance=limit,
         strays=int(np.isfinite(p_WQs).all(axis=0).sum()) - points.shape[1],

@@ -13,8 +13,10 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
+from perception.values import TileSize
 
 EDGE = 2.0  # Of the square tile, m.
+TILE = TileSize(EDGE, EDGE)
 MARGIN = 0.2  # Of wall around the tile, m.
 STAND_OFF = 0.7  # Of the camera from the wall, m; Source: Tadic et al., 2021, 4.1.
 

@@ -7,6 +7,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from perception.ground import BoolArray, FloatArray
+from perception.values import TileSize
+
+_TILE = TileSize(2.0, 2.0)
 
 
 @dataclass(frozen=True)
@@ -43,8 +46,7 @@ EXAMPLE_PATCHES = (
 def synthetic_wall(
     patches: Sequence[Patch] = EXAMPLE_PATCHES,
     *,
-    width: float = 2.0,
-    height: float = 2.0,
+    tile: TileSize = _TILE,
     margin: float = 0.2,
     spacing: float = 0.005,
     noise: float = 0.0015,
@@ -56,8 +58,7 @@ def synthetic_wall(
 
     Args:
         patches: What is not wall; a later one lies over the earlier ones.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        tile: Its size.
         margin: Of wall around the tile, m.
         spacing: Of the points, m; they are jittered within their squares.
         noise: Standard deviation of depth, m.
@@ -69,8 +70,8 @@ def synthetic_wall(
         p_WQs (3, N) m, in W, in random order.
     """
     x, y = np.meshgrid(
-        np.arange(-margin, width + margin, spacing),
-        np.arange(-margin, height + margin, spacing),
+        np.arange(-margin, tile.width + margin, spacing),
+        np.arange(-margin, tile.height + margin, spacing),
     )
     x, y = x.ravel(), y.ravel()
     x, y = (axis + rng.uniform(0.0, spacing, axis.size) for axis in (x, y))
@@ -79,7 +80,7 @@ def synthetic_wall(
         z[_inside(patch, x, y)] = patch.depth
     p_TQs = np.stack([x, y, z + rng.normal(0.0, noise, z.size)])[:, np.isfinite(z)]
     strewn = rng.uniform(
-        [[0.0]] * 2 + [[-0.5]], [[width], [height], [0.5]], (3, outliers)
+        [[0.0]] * 2 + [[-0.5]], [[tile.width], [tile.height], [0.5]], (3, outliers)
     )
     p_TQs = rng.permutation(np.concatenate([p_TQs, strewn], axis=1), axis=1)
     return p_TQs if X_WT is None else X_WT @ p_TQs
@@ -88,25 +89,21 @@ def synthetic_wall(
 def synthetic_truth(
     patches: Sequence[Patch] = EXAMPLE_PATCHES,
     *,
-    width: float = 2.0,
-    height: float = 2.0,
+    tile: TileSize = _TILE,
     cell: float = 0.01,
 ) -> BoolArray:
     """Returns the true mask of `synthetic_wall`: cells whose centre is wall.
 
     Args:
         patches: What is not wall.
-        width: Of the tile, m.
-        height: Of the tile, m.
+        tile: Its size.
         cell: Edge of a cell, m.
 
     Returns:
         (ny, nx), row 0 at the bottom.
     """
-    x, y = np.meshgrid(
-        (np.arange(round(width / cell)) + 0.5) * cell,
-        (np.arange(round(height / cell)) + 0.5) * cell,
-    )
+    ny, nx = tile.shape(cell)
+    x, y = np.meshgrid((np.arange(nx) + 0.5) * cell, (np.arange(ny) + 0.5) * cell)
     mask = np.ones(x.shape, dtype=np.bool_)
     for patch in patches:
         mask &= ~_inside(patch, x, y)

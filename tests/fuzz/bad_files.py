@@ -246,7 +246,7 @@ def attempt(path, *, fine):
             fine=fine,
         )
         json.dumps(segmentation_figures(found), allow_nan=False)
-        result = found.steps.segmentation
+        result = found.stages.segmentation
         # A mask is of what was seen, or of tiny gaps in it, on a sound tile frame.
         assert result.X_WT.IsNearlyEqualTo(result.X_WT, 1e-9)
         assert np.isfinite(result.X_WT.GetAsMatrix4()).all()

@@ -79,7 +79,7 @@ def test_any_points_are_answered_or_refused(extra, copies):
         )
     except PerceptionError:
         return
-    result = found.steps.segmentation
+    result = found.stages.segmentation
     assert result.wall_mask.any()
     assert np.isfinite(result.X_WT.GetAsMatrix4()).all()
 

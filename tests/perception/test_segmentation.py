@@ -15,8 +15,9 @@ from perception.synthetic.patch_wall import (
     synthetic_truth,
     synthetic_wall,
 )
+from perception.values import SurfaceMap, TileSize
 
-SIZE = {"width": 2.0, "height": 2.0}
+TILE = TileSize(2.0, 2.0)
 GLASS = float("nan")
 
 
@@ -24,7 +25,9 @@ def segment(points, X_WT=None, *, seed=1, **settings):
     """Segments a 2 x 2 m tile."""
     config = SegmentationConfig(**settings)
     X_WT = RigidTransform() if X_WT is None else X_WT
-    return segment_wall(points, X_WT, **SIZE, config=config, seed=seed)
+    return segment_wall(
+        SurfaceMap.of_points(points), X_WT, TILE, config=config, seed=seed
+    )
 
 
 def cloud(patches, **options):
@@ -139,15 +142,10 @@ def test_edges_on_a_map_are_where_they_are(corner):
 
     z = 0.1 * on_plate(x, y) + rng.normal(0.0, 0.0005, x.shape)
     points = np.stack([x, y, z]).reshape(3, -1)
-    voxels = VoxelMap.empty(RigidTransform(), **SIZE, config=MapConfig())
+    voxels = VoxelMap.empty(RigidTransform(), 2.0, 2.0, config=MapConfig())
     surface = voxels.fuse(points, np.array([1.0, 1.0, 0.7])).surface_map
     result = segment_wall(
-        surface.p_WQs,
-        RigidTransform(),
-        **SIZE,
-        config=SegmentationConfig(),
-        seed=1,
-        counts=surface.counts,
+        surface, RigidTransform(), TILE, config=SegmentationConfig(), seed=1
     )
     centres = (np.arange(200) + 0.5) * 0.01
     wall = ~on_plate(*np.meshgrid(centres, centres))

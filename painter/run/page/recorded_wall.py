@@ -29,11 +29,11 @@ def write_recorded_wall(
         The figures that were written to `segmentation.json`.
     """
     figures = segmentation_figures(wall)
-    steps = wall.steps
-    save_segmentation(folder / "segmentation.npz", steps.segmentation)
-    save_wall_mask(folder / "wall_mask.png", steps.segmentation.wall_mask)
+    stages = wall.stages
+    save_segmentation(folder / "segmentation.npz", stages.segmentation)
+    save_wall_mask(folder / "wall_mask.png", stages.segmentation.wall_mask)
     (folder / "segmentation.json").write_text(json.dumps(figures, indent=2) + "\n")
-    segmentation_picture(folder / "segmentation.png", steps, title=title)
+    segmentation_picture(folder / "segmentation.png", stages, title=title)
     return figures
 
 
@@ -49,11 +49,11 @@ def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
         areas, of what is not to be painted by reason; and lists of openings, with
         their boxes in T (left, bottom, right, top), of planes and of regions.
     """
-    steps = wall.steps
-    result, found = steps.segmentation, steps.found
+    stages = wall.stages
+    result, found = stages.segmentation, stages.found
     area = result.cell**2
     normal = result.X_WT.rotation().matrix()[:, 2]
-    plane = found.planes[steps.wall_plane - 1]
+    plane = found.planes[stages.wall_plane - 1]
     kept = found.p_WQs[:, found.kept]
     seen = result.labels > 0
     return {
@@ -65,8 +65,8 @@ def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
         "inlier_distance_m": _rounded(wall.inlier_distance),
         "wall_distance_m": _rounded(abs(plane.offset)),
         "wall_normal": [_rounded(value) for value in normal],
-        "wall_rms_m": _rounded(steps.wall.rms),
-        "wall_point_share": _rounded(steps.wall.inlier_share),
+        "wall_rms_m": _rounded(stages.wall.rms),
+        "wall_point_share": _rounded(stages.wall.inlier_share),
         "wall_contrast": _finite(contrast(plane, kept, threshold=wall.inlier_distance)),
         "set_back_area_m2": _rounded(wall.set_back_area),
         "wall_area_m2": _rounded(np.count_nonzero(result.wall_mask) * area),
@@ -83,16 +83,16 @@ def segmentation_figures(wall: RecordedWall) -> dict[str, Any]:
             }
             for plane in found.planes
         ],
-        "regions": [_region_figures(steps, label) for label in _labels(steps)],
+        "regions": [_region_figures(stages, label) for label in _labels(stages)],
     }
 
 
-def _labels(steps: SegmentationStages) -> range:
-    return range(1, int(steps.segmentation.labels.max()) + 1)
+def _labels(stages: SegmentationStages) -> range:
+    return range(1, int(stages.segmentation.labels.max()) + 1)
 
 
-def _region_figures(steps: SegmentationStages, label: int) -> dict[str, Any]:
-    result = steps.segmentation
+def _region_figures(stages: SegmentationStages, label: int) -> dict[str, Any]:
+    result = stages.segmentation
     cells = result.labels == label
     depth = result.depth[cells]
     depth = depth[np.isfinite(depth)]

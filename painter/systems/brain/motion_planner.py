@@ -14,7 +14,7 @@ from painter.systems.values import StageResult
 from perception.config import SegmentationConfig
 from perception.fine_steps.shadows import find_relief
 from perception.ground import check_positive
-from perception.values import SurfaceMap, Wall
+from perception.values import SurfaceMap, TileSize, Wall
 
 MORE_LOOKS = "more looks"
 
@@ -97,8 +97,7 @@ class MotionPlanner(Stage):
         relief = find_relief(
             X_TW @ surface_map.p_WQs,
             X_TW @ surface_map.p_WCs,
-            width=tile.width,
-            height=tile.height,
+            TileSize(tile.width, tile.height),
             cell=self._cell,
         )
         return self._planner.more_looks(q0, relief, X_WT)

@@ -12,7 +12,7 @@ from perception.config import SegmentationConfig
 from perception.ground import check_positive
 from perception.mapping.config import PoseGraphConfig
 from perception.paper_steps.wall import find_wall
-from perception.values import SurfaceMap, Wall
+from perception.values import SurfaceMap, TileSize, Wall
 
 
 class WallFinder(Stage):
@@ -39,8 +39,7 @@ class WallFinder(Stage):
         self,
         *,
         X_WT_expected: RigidTransform,
-        width: float,
-        height: float,
+        tile: TileSize,
         config: SegmentationConfig,
         seed: int,
         period: float,
@@ -50,27 +49,20 @@ class WallFinder(Stage):
 
         Args:
             X_WT_expected: Tile frame where the job expects it.
-            width: Of the tile, m, along T x.
-            height: Of the tile, m, along T y.
+            tile: Its size.
             config: Thresholds.
             seed: Of RANSAC's random draws.
-            period: Time between looks at the request, s.
+            period: Time between reads of the request, s.
             mount_limit_deg: A camera found to be tilted by more is warned of.
 
         Raises:
-            ValueError: A size is not positive or a threshold out of bounds.
+            ValueError: A number is not positive or a threshold out of bounds.
         """
-        check_positive(
-            "wall_finder",
-            width=width,
-            height=height,
-            period=period,
-            mount_limit_deg=mount_limit_deg,
-        )
+        check_positive("wall_finder", period=period, mount_limit_deg=mount_limit_deg)
         config.validate()
         super().__init__(stage="wall_finder", period=period)
         self._X_WT_expected = X_WT_expected
-        self._size = {"width": width, "height": height}
+        self._tile = tile
         self._config = config
         self._seed = seed
         self._mount_limit_deg = mount_limit_deg
@@ -94,7 +86,7 @@ class WallFinder(Stage):
         return find_wall(
             surface_map.p_WQs,
             self._X_WT_expected,
-            **self._size,
+            self._tile,
             config=self._config,
             seed=self._seed,
             up_W=UP_W,

@@ -1,6 +1,5 @@
 """The stage that parts the scanned wall into what to paint and what not."""
 
-import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context
 
@@ -11,7 +10,7 @@ from painter.systems.values import UP_W, StageResult
 from perception.config import SegmentationConfig
 from perception.ground import check_positive
 from perception.segmentation import segment_wall
-from perception.values import SurfaceMap, Wall, WallSegmentation
+from perception.values import SurfaceMap, TileSize, Wall, WallSegmentation
 
 
 class WallSegmenter(Stage):
@@ -39,8 +38,7 @@ class WallSegmenter(Stage):
     def __init__(
         self,
         *,
-        width: float,
-        height: float,
+        tile: TileSize,
         config: SegmentationConfig,
         seed: int,
         period: float,
@@ -48,19 +46,18 @@ class WallSegmenter(Stage):
         """Creates the stage.
 
         Args:
-            width: Of the tile, m, along T x.
-            height: Of the tile, m, along T y.
+            tile: Its size.
             config: Thresholds of the six steps.
             seed: Of RANSAC's random draws.
-            period: Time between looks at the request, s.
+            period: Time between reads of the request, s.
 
         Raises:
-            ValueError: A size is not positive or a threshold out of bounds.
+            ValueError: A number is not positive or a threshold out of bounds.
         """
-        check_positive("wall_segmenter", width=width, height=height, period=period)
+        check_positive("wall_segmenter", period=period)
         config.validate()
         super().__init__(stage="wall_segmenter", period=period)
-        self._width, self._height = width, height
+        self._tile = tile
         self._config = config
         self._seed = seed
         # Inputs.
@@ -78,14 +75,10 @@ class WallSegmenter(Stage):
                 code="PNT-CYCLE-008",
             )
         return segment_wall(
-            surface_map.p_WQs,
+            surface_map,
             wall.X_WT,
-            width=self._width,
-            height=self._height,
+            self._tile,
             config=self._config,
             seed=self._seed,
-            counts=surface_map.counts,
-            variances=surface_map.variances.astype(np.float64),
-            p_WCs=surface_map.p_WCs,
             up_W=UP_W,
         )

@@ -11,15 +11,16 @@ from perception.paper_steps.planes import Plane
 from perception.paper_steps.wall import choose_plane
 from perception.segmentation import segment_wall
 from perception.synthetic.patch_wall import Patch, synthetic_truth, synthetic_wall
+from perception.values import SurfaceMap, TileSize
 
-SIZE = {"width": 1.0, "height": 1.0}
+TILE = TileSize(1.0, 1.0)
 PLATE = Patch(0.2, 0.2, 0.4, 0.4, 0.010)
 RECESS = Patch(0.6, 0.6, 0.8, 0.8, -0.020)
 
 
 def cloud(patches, *, noise=0.0007, bend=None, seed=0):
     rng = np.random.default_rng(seed)
-    points = synthetic_wall(patches, **SIZE, spacing=0.005, noise=noise, rng=rng)
+    points = synthetic_wall(patches, tile=TILE, spacing=0.005, noise=noise, rng=rng)
     if bend is not None:
         points[2] += bend(points[0], points[1])
     return points
@@ -28,7 +29,12 @@ def cloud(patches, *, noise=0.0007, bend=None, seed=0):
 def segment(points, **options):
     config = options.pop("config", None) or SegmentationConfig()
     return segment_wall(
-        points, RigidTransform(), **SIZE, config=config, seed=1, **options
+        SurfaceMap.of_points(points),
+        RigidTransform(),
+        TILE,
+        config=config,
+        seed=1,
+        **options,
     )
 
 
@@ -47,7 +53,7 @@ def iou(mask, truth):
 )
 def test_steps_of_1_cm_are_found_also_on_uneven_walls(bend):
     result = segment(cloud([PLATE, RECESS], bend=bend))
-    truth = synthetic_truth([PLATE, RECESS], **SIZE)
+    truth = synthetic_truth([PLATE, RECESS], tile=TILE)
     assert iou(result.wall_mask, truth) > 0.995
     assert (result.reason[22:38, 22:38] == Reason.RAISED).all()
     assert (result.reason[62:78, 62:78] == Reason.RECESSED).all()
@@ -68,7 +74,7 @@ def test_bare_wall_has_no_false_steps_and_full_confidence():
 def test_a_step_within_the_noise_is_no_step():
     # 10 mm against 4 mm: 2.5 standard deviations a point, but many points agree.
     found = segment(cloud([PLATE], noise=0.004))
-    truth = synthetic_truth([PLATE], **SIZE)
+    truth = synthetic_truth([PLATE], tile=TILE)
     assert iou(found.wall_mask, truth) > 0.98
     # 4 mm against 4 mm does not reach the least step, and nothing false comes up.
     low = Patch(0.2, 0.2, 0.4, 0.4, 0.004)
@@ -91,7 +97,7 @@ def test_larger_panel_of_a_door_does_not_become_the_wall():
     # The door has more points, but the wall is where it is expected.
     door = Patch(-0.2, -0.2, 0.65, 1.2, -0.14)
     result = segment(cloud([door]))
-    assert iou(result.wall_mask, synthetic_truth([door], **SIZE)) > 0.98
+    assert iou(result.wall_mask, synthetic_truth([door], tile=TILE)) > 0.98
 
 
 @pytest.mark.parametrize("count", [900, 700])
@@ -101,7 +107,7 @@ def test_two_equally_good_walls_are_refused(count):
         Plane(normal=normal, offset=0.05, rms=0.001, count=1000),
         Plane(normal=normal, offset=-0.05, rms=0.001, count=count),
     ]
-    options = SIZE | {"total": 2000, "config": SegmentationConfig()}
+    options = {"tile": TILE, "total": 2000, "config": SegmentationConfig()}
     if count == 700:
         assert choose_plane(planes, RigidTransform(), **options) == 0
         return
@@ -131,6 +137,6 @@ def test_oblique_wall_and_floor_are_refused():
 def test_cells_of_any_size(cell):
     config = SegmentationConfig(cell=cell)
     result = segment(cloud([PLATE, RECESS]), config=config)
-    truth = synthetic_truth([PLATE, RECESS], **SIZE, cell=cell)
+    truth = synthetic_truth([PLATE, RECESS], tile=TILE, cell=cell)
     assert result.wall_mask.shape == result.normals.shape[:2] == truth.shape
     assert iou(result.wall_mask, truth) > 0.98

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from perception.fine_steps.shadows import find_relief
+from perception.values import TileSize
 
 CELL = 0.01
 
@@ -22,7 +23,7 @@ def scanned(*, hidden, top=0.1, offset=0.0):
 
 def relief_of(p_TQs, eyes=None):
     eyes = np.zeros((3, 0)) if eyes is None else eyes
-    return find_relief(p_TQs, eyes, width=1.0, height=1.0, cell=CELL)
+    return find_relief(p_TQs, eyes, TileSize(1.0, 1.0), cell=CELL)
 
 
 @pytest.mark.parametrize("offset", [-0.01, 0.0, 0.01])

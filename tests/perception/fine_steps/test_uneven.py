@@ -8,8 +8,9 @@ from perception.config import SegmentationConfig
 from perception.fine_steps.unseen import Reason
 from perception.segmentation import segment_wall
 from perception.synthetic.patch_wall import Patch, synthetic_truth, synthetic_wall
+from perception.values import SurfaceMap, TileSize
 
-SIZE = {"width": 2.0, "height": 2.0}
+TILE = TileSize(2.0, 2.0)
 WINDOW = Patch(0.3, 1.2, 0.8, 1.8, -0.12)
 BOX = Patch(1.5, 0.5, 1.7, 0.8, 0.03)
 PLATE = Patch(0.3, 0.3, 0.5, 0.5, 0.012)
@@ -18,7 +19,7 @@ X, Y = np.meshgrid(*[(np.arange(200) + 0.5) * 0.01] * 2)
 
 def cloud(patches=(WINDOW, BOX, PLATE), bend=None):
     rng = np.random.default_rng(0)
-    points = synthetic_wall(patches, **SIZE, spacing=0.006, noise=0.0007, rng=rng)
+    points = synthetic_wall(patches, tile=TILE, spacing=0.006, noise=0.0007, rng=rng)
     if bend is not None:
         points[2] += bend(points[0], points[1])
     return points
@@ -26,9 +27,9 @@ def cloud(patches=(WINDOW, BOX, PLATE), bend=None):
 
 def segment(points, config=None):
     return segment_wall(
-        points,
+        SurfaceMap.of_points(points),
         RigidTransform(),
-        **SIZE,
+        TILE,
         config=config or SegmentationConfig(),
         seed=1,
     )
@@ -52,7 +53,7 @@ def iou(mask, truth):
 )
 def test_openings_and_low_steps_are_found_on_walls_that_are_no_planes(bend):
     result = segment(cloud(bend=bend))
-    truth = synthetic_truth((WINDOW, BOX, PLATE), **SIZE)
+    truth = synthetic_truth((WINDOW, BOX, PLATE), tile=TILE)
     assert iou(result.wall_mask, truth) > 0.99
     (window,) = result.openings
     assert window.kind == "rectangle"
@@ -61,7 +62,7 @@ def test_openings_and_low_steps_are_found_on_walls_that_are_no_planes(bend):
 
 def test_wall_at_right_angles_is_an_obstacle():
     result = segment(cloud(bend=lambda x, y: np.maximum(0.0, 40.0 * (x - 1.5))))
-    truth = synthetic_truth((WINDOW, BOX, PLATE), **SIZE) & (X < 1.5)
+    truth = synthetic_truth((WINDOW, BOX, PLATE), tile=TILE) & (X < 1.5)
     assert iou(result.wall_mask, truth) > 0.99
     assert (result.reason[:, 152:] == Reason.RAISED).mean() > 0.99
 
@@ -104,7 +105,7 @@ def mirroring_window(seed=0):
 
 def test_mirror_image_behind_a_pane_is_glass():
     result = segment(mirroring_window())
-    assert iou(result.wall_mask, synthetic_truth((WINDOW,), **SIZE)) > 0.99
+    assert iou(result.wall_mask, synthetic_truth((WINDOW,), tile=TILE)) > 0.99
     (window,) = result.openings
     assert window.kind == "rectangle"
     assert (result.reason[128:172, 38:72] == Reason.GLASS).mean() > 0.98
@@ -121,15 +122,19 @@ def test_mirror_image_behind_a_pane_is_glass():
     ],
 )
 def test_tiles_and_cells_of_any_size(width, height, cell):
-    size = {"width": width, "height": height}
+    tile = TileSize(width, height)
     rng = np.random.default_rng(0)
     patch = Patch(0.2, 0.1, 0.6, 0.4, 0.05)
     points = synthetic_wall(
-        (patch,), **size, spacing=max(0.007, cell / 2), noise=0.0007, rng=rng
+        (patch,), tile=tile, spacing=max(0.007, cell / 2), noise=0.0007, rng=rng
     )
     result = segment_wall(
-        points, RigidTransform(), **size, config=SegmentationConfig(cell=cell), seed=1
+        SurfaceMap.of_points(points),
+        RigidTransform(),
+        tile,
+        config=SegmentationConfig(cell=cell),
+        seed=1,
     )
-    truth = synthetic_truth((patch,), **size, cell=cell)
+    truth = synthetic_truth((patch,), tile=tile, cell=cell)
     assert result.wall_mask.shape == (round(height / cell), round(width / cell))
     assert iou(result.wall_mask, truth) > 0.99

@@ -8,8 +8,9 @@ from perception.config import SegmentationConfig
 from perception.errors import AmbiguousWallError, NoWallError
 from perception.paper_steps.wall import find_wall
 from perception.synthetic.patch_wall import synthetic_wall
+from perception.values import TileSize
 
-SIZE = {"width": 2.0, "height": 2.0}
+TILE = TileSize(2.0, 2.0)
 # A plumb wall across W x, 1.05 m ahead: T x = -W y, T y = W z, T z = -W x.
 X_WT_NOMINAL = RigidTransform(
     RotationMatrix(np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])),
@@ -20,7 +21,7 @@ X_WT_NOMINAL = RigidTransform(
 def find(points, *, config=None, seed=1):
     """Looks for the wall near the nominal pose."""
     config = config or SegmentationConfig()
-    return find_wall(points, X_WT_NOMINAL, **SIZE, config=config, seed=seed)
+    return find_wall(points, X_WT_NOMINAL, TILE, config=config, seed=seed)
 
 
 def wall_points(X_TS=None, *, patches=(), seed=0):
@@ -141,10 +142,10 @@ def test_floor_larger_than_the_wall_is_not_the_wall():
     points = np.concatenate([wall_points(), floor], axis=1)
     up_W = np.array([0.0, 0.0, 1.0])
     wall = find_wall(
-        points, X_WT_NOMINAL, **SIZE, config=SegmentationConfig(), seed=1, up_W=up_W
+        points, X_WT_NOMINAL, TILE, config=SegmentationConfig(), seed=1, up_W=up_W
     )
     assert wall.X_WT.translation()[0] == pytest.approx(1.05, abs=1e-3)
     with pytest.raises(NoWallError, match="level, as floors are"):
         find_wall(
-            floor, X_WT_NOMINAL, **SIZE, config=SegmentationConfig(), seed=1, up_W=up_W
+            floor, X_WT_NOMINAL, TILE, config=SegmentationConfig(), seed=1, up_W=up_W
         )

@@ -41,9 +41,9 @@ def test_viewpoint_tells_front_from_back():
     back = segment(wall(box), p_WC=np.array([5.0, 0.0, 0.0]))
     for found, sign in ((front, -1.0), (back, 1.0)):
         assert found.side.source is ViewSource.GIVEN
-        normal = found.steps.segmentation.X_WT.rotation().matrix()[:, 2]
+        normal = found.stages.segmentation.X_WT.rotation().matrix()[:, 2]
         np.testing.assert_allclose(normal, [sign, 0.0, 0.0], atol=1e-3)
-    depth = back.steps.segmentation.depth
+    depth = back.stages.segmentation.depth
     assert np.nanmin(depth) == pytest.approx(-0.1, abs=0.01)
 
 
@@ -79,7 +79,7 @@ def test_sparse_cloud_has_a_whole_mask():
     found = segment(
         wall(spacing=0.05), config=SegmentationConfig(cell=0.01), fit_cell=True
     )
-    result = found.steps.segmentation
+    result = found.stages.segmentation
     assert 0.03 <= result.cell <= 0.08  # The points are strewn, not in rows.
     assert result.wall_mask.mean() > 0.97
 
@@ -93,7 +93,7 @@ def test_extent_is_that_of_the_wall_without_strays():
 
 
 def test_tile_is_what_is_seen():
-    result = segment(wall()).steps.segmentation
+    result = segment(wall()).stages.segmentation
     np.testing.assert_allclose(np.array(result.wall_mask.shape) * 0.04, 2.0, atol=0.05)
 
 
@@ -124,7 +124,7 @@ def test_wall_set_back_beside_the_wall_is_an_option():
     assert plain.set_back_area == 0.0
     # The strip, 2 m x 1 m; not the window, 1 m x 1 m at the same depth.
     assert found.set_back_area == pytest.approx(2.0, abs=0.15)
-    mask = found.steps.segmentation.wall_mask
+    mask = found.stages.segmentation.wall_mask
     window = mask[14:27, 34:47]
     assert window.mean() < 0.05
     assert segment(
@@ -138,7 +138,7 @@ def test_foot_of_an_obstacle_is_not_painted():
     side = rng.uniform([0.0, 0.26, 0.4], [0.1, 0.3, 1.0], (2000, 3))
     sides = X_WALL @ np.stack([side[:, 1], side[:, 2], side[:, 0]])
     points = np.concatenate([wall(Patch(0.3, 0.4, 0.9, 1.0, 0.1)), sides], axis=1)
-    result = segment(points, config=SegmentationConfig(cell=0.02)).steps.segmentation
+    result = segment(points, config=SegmentationConfig(cell=0.02)).stages.segmentation
     p_T = result.X_WT.inverse() @ X_WALL @ np.array([0.28, 0.7, 0.0])
     column, row = (p_T[:2] / result.cell).astype(int)
     assert not result.wall_mask[row - 5 : row + 5, column].any()

@@ -30,7 +30,7 @@ def segment(points, *, width=2.0, height=2.0, **options):
     config = options.pop("config", SegmentationConfig())
     return segment_recorded(
         points, width=width, height=height, config=config, seed=1, **options
-    ).steps
+    ).stages
 
 
 def wall(patches=()):
@@ -46,12 +46,12 @@ def floor():
 
 
 def test_tile_is_centred_upright_and_faces_the_sensor():
-    steps = segment(wall(), up_W=UP_Z, config=SegmentationConfig(cell=0.04))
+    stages = segment(wall(), up_W=UP_Z, config=SegmentationConfig(cell=0.04))
     # The middle of 10000 points between their 1st and 99th percentiles.
     np.testing.assert_allclose(
-        steps.segmentation.X_WT.GetAsMatrix4(), X_WALL.GetAsMatrix4(), atol=0.01
+        stages.segmentation.X_WT.GetAsMatrix4(), X_WALL.GetAsMatrix4(), atol=0.01
     )
-    assert steps.segmentation.wall_mask.mean() > 0.97
+    assert stages.segmentation.wall_mask.mean() > 0.97
 
 
 @pytest.mark.parametrize(
@@ -78,9 +78,9 @@ def test_a_grid_of_too_many_cells_is_refused(fine, cell, most, enough):
 def test_without_a_direction_up_is_the_pictures():
     # The same wall in a camera's frame: x right, y down, z ahead.
     R_CW = RotationMatrix(np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]))
-    steps = segment(R_CW @ wall(), config=SegmentationConfig(cell=0.04))
+    stages = segment(R_CW @ wall(), config=SegmentationConfig(cell=0.04))
     np.testing.assert_allclose(
-        steps.segmentation.X_WT.rotation().matrix(),
+        stages.segmentation.X_WT.rotation().matrix(),
         np.diag([1.0, -1.0, -1.0]),
         atol=1e-3,
     )
@@ -149,8 +149,8 @@ def test_walls_of_another_painting_robot_are_found(name, distance, normal):
     points = read_cloud(DATA / "painting_robot_wall_scans" / f"{name}.pcd").p_WQs
     # Scan lines are 2 to 5 cm apart; z points down.
     config = SegmentationConfig(cell=0.05)
-    steps = segment(points, width=4.0, height=4.0, up_W=-UP_Z, config=config)
-    plane = steps.found.planes[steps.wall_plane - 1]
+    stages = segment(points, width=4.0, height=4.0, up_W=-UP_Z, config=config)
+    plane = stages.found.planes[stages.wall_plane - 1]
     # The scans are noisy by 12 mm and the swaying one by 5 cm and more.
     assert abs(plane.offset) == pytest.approx(distance, abs=0.02)
     assert abs(plane.normal @ normal) > np.cos(np.radians(1.5))

@@ -10,7 +10,7 @@ from painter.systems.brain.wall_finder import WallFinder
 from painter.systems.values import StageRequest, StageResult
 from perception.config import SegmentationConfig
 from perception.synthetic.patch_wall import synthetic_wall
-from perception.values import SurfaceMap, Wall
+from perception.values import SurfaceMap, TileSize, Wall
 
 # A plumb wall across W x: T x = -W y, T y = W z, T z = -W x.
 PLUMB = RotationMatrix(np.array([[0.0, 0.0, -1], [-1, 0, 0], [0, 1, 0]]))
@@ -33,8 +33,7 @@ def make_finder(**changes):
     """A finder for a 2 x 2 m tile."""
     options = {
         "X_WT_expected": X_WT_EXPECTED,
-        "width": 2.0,
-        "height": 2.0,
+        "tile": TileSize(2.0, 2.0),
         "config": SegmentationConfig(),
         "seed": 1,
         "period": 0.1,
@@ -98,7 +97,6 @@ def test_requests_to_others_are_not_answered():
     assert result.number == 0
 
 
-@pytest.mark.parametrize("name", ["width", "height", "period"])
-def test_sizes_must_be_positive(name):
-    with pytest.raises(ValueError, match=f"{name} must be > 0, got -1"):
-        make_finder(**{name: -1.0})
+def test_the_period_must_be_positive():
+    with pytest.raises(ValueError, match=r"period must be > 0, got -1"):
+        make_finder(period=-1.0)
