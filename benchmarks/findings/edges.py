@@ -27,7 +27,8 @@ from painter.planning.film import film_cost
 from painter.planning.film.deposition import half_axes
 from painter.planning.film.figures import COVERED, OVERSPRAYED, FilmFigures
 from painter.planning.film.film_model import FilmModel, Site
-from painter.planning.strokes.raster import plan_strokes, raster_film
+from painter.planning.strokes.raster import plan_strokes
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.scene.load import load_scene
 from painter.scene.surface import height_field, is_paintable
 from perception.ground import BoolArray, FloatArray
@@ -37,7 +38,7 @@ TIP = TipConfig()
 STANDOFFS = (0.30, 0.20, 0.10, 0.08, 0.06)  # m, of the strokes beside edges.
 FLOWS = (1.0, 1.25, 1.5)  # Peak of such a stroke's film, as share of nominal.
 # Of soiled cells: half of the planner's own weight, that, and twice as much.
-WEIGHTS = tuple(share * film_cost._OPENINGS.soiled for share in (0.5, 1.0, 2.0))
+WEIGHTS = tuple(share * film_cost.OPENINGS.keepout for share in (0.5, 1.0, 2.0))
 ASKED = {"terrace": (0.96, 0.03), "room": (0.96, 0.03)}  # Coverage, keepout_paint.
 
 
@@ -161,13 +162,13 @@ def planned(
 ) -> FilmFigures:
     """Returns the figures of the planner's strokes."""
     raster = RasterConfig(cut_in_standoff=standoff)
-    weights = film_cost._OPENINGS._replace(soiled=weight)
-    with mock.patch.object(film_cost, "_OPENINGS", weights):
-        strokes = plan_strokes(mask, CELL, tip=TIP, raster=raster, height=height)
-    nominal = raster_film(mask.shape[1] * CELL, tip=TIP, raster=raster)
+    weights = film_cost.OPENINGS.replace(keepout=weight)
+    with mock.patch.object(film_cost, "OPENINGS", weights):
+        strokes = plan_strokes(mask, CELL, SpraySettings(TIP, raster), height=height)
+    nominal = SpraySettings(TIP, raster).nominal_film(mask.shape[1] * CELL)
     site = Site.of_tile(mask, CELL, height)
     film = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal).film(strokes)
-    return FilmFigures.of(film[site.wanted], film[site.clean], film.sum())
+    return FilmFigures.of(film[site.paintable], film[site.keepout], film.sum())
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.film.figures import FilmFigures
 from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
-from painter.planning.strokes.raster import plan_strokes, raster_film
-from painter.planning.strokes.stroke_lines import nominal_pitch
+from painter.planning.strokes.raster import plan_strokes
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.strokes.stroke_order import order_strokes, transition_time
 from painter.scene.load import load_scene
 from painter.scene.surface import height_field, is_paintable
@@ -55,7 +55,7 @@ def plain(mask: BoolArray, height: FloatArray) -> tuple[Stroke, ...]:
     """Returns evenly spaced strokes, open where the axis points at wall."""
     raster = RasterConfig()
     width = mask.shape[1] * CELL
-    pitch = nominal_pitch(width, tip=TIP, raster=raster)
+    pitch = SpraySettings(TIP, raster).nominal_pitch(width)
     strokes = []
     for column in range(round(width / pitch)):
         x_line = (column + 0.5) * pitch
@@ -80,17 +80,17 @@ def planned(
 ) -> tuple[Stroke, ...]:
     """Returns our strokes."""
     raster = RasterConfig(cut_in=cut_in, coats=coats)
-    return plan_strokes(mask, CELL, tip=TIP, raster=raster, height=height)
+    return plan_strokes(mask, CELL, SpraySettings(TIP, raster), height=height)
 
 
 def row(mask: BoolArray, height: FloatArray, strokes: tuple[Stroke, ...]) -> str:
     """Returns the figures of strokes as text."""
     raster = RasterConfig()
     site = Site.of_tile(mask, CELL, height)
-    nominal = raster_film(mask.shape[1] * CELL, tip=TIP, raster=raster)
+    nominal = SpraySettings(TIP, raster).nominal_film(mask.shape[1] * CELL)
     model = FilmModel(site, tip=TIP, speed=raster.speed, nominal=nominal)
     film = model.film(strokes)
-    on, off = film[site.wanted], film[site.clean]
+    on, off = film[site.paintable], film[site.keepout]
     seconds = sum(stroke.length / stroke.speed for stroke in strokes)
     for coat in {stroke.coat for stroke in strokes}:
         of_coat = [stroke for stroke in strokes if stroke.coat == coat]

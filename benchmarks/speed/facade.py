@@ -15,7 +15,7 @@ from painter.errors import PainterError
 from painter.planning.film.deposition import mean_film, predicted_film
 from painter.planning.spray_path import Stroke
 from painter.planning.strokes.facade import BasePosition, plan_base_positions
-from painter.planning.strokes.stroke_lines import nominal_pitch
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.tile import grid_shape, nominal_tile_pose
 from painter.robot.planners import MakeProgramPlanner
 from perception.values import WallSegmentation
@@ -43,7 +43,7 @@ def main() -> None:
     for width, height in SIZES:
         start = time.process_time()
         base_positions = plan_base_positions(
-            width, height, tile=job.tile, tip=job.gun.tip, raster=job.raster
+            width, height, SpraySettings(job.gun.tip, job.raster), tile=job.tile
         )
         laid = time.process_time() - start
         start = time.process_time()
@@ -96,7 +96,7 @@ def joint_film(
     ]
     x = np.arange(CELL / 2.0, width, CELL)
     y = np.arange(CELL / 2.0, height, CELL)
-    pitch = nominal_pitch(width, tip=job.gun.tip, raster=job.raster)
+    pitch = SpraySettings(job.gun.tip, job.raster).nominal_pitch(width)
     nominal = mean_film(job.gun.tip, speed=job.raster.speed, pitch=pitch)
     film = predicted_film(strokes, x, y, tip=job.gun.tip) / nominal
     inside = film[15:-15, 15:-15]

@@ -22,6 +22,7 @@ from painter.errors import InputError
 from painter.planning.arm.placement import propose_distance
 from painter.planning.config import ZoneConfig
 from painter.planning.strokes.facade import plan_base_positions
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.robot.reach_mapper import ReachMapper
 from painter.scene.config import Scene
 from painter.scene.load import load_scene
@@ -91,9 +92,8 @@ def place(
         stations = plan_base_positions(
             width,
             height,
+            SpraySettings(job.gun.tip, job.raster),
             tile=job.tile,
-            tip=job.gun.tip,
-            raster=job.raster,
             zones=zones,
         )
     except ValueError as error:

@@ -124,7 +124,7 @@ def plan(
             program = planner.program(rest, wall, home)
         compute_time = time.perf_counter() - start
         show(0.8, "files")
-        asked = wall.replace(wall_mask=planner.wanted(wall))
+        asked = wall.replace(wall_mask=planner.paintable(wall))
         preview = preview_film(
             program.strokes, asked, tip=planner.tip, nominal=nominal, before=film
         )

@@ -24,7 +24,7 @@ from painter.cycle.earlier_run import EarlierRun
 from painter.cycle.simulate import SimulateCycle, Watch
 from painter.cycle.write_run import event_watch, write_log
 from painter.errors import FaultError, InputError
-from painter.planning.strokes.stroke_lines import nominal_pitch
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.run.folder.folder import SCENE, RunFolder
 from painter.run.page.report import finish_run
 from painter.run.pictures.replay import add_paint, set_view
@@ -126,7 +126,7 @@ def simulate(
         sprayed = np.flatnonzero(log.trigger)
         if log.program is not None and sprayed.size:
             began = log.time[sprayed[0]] - log.program.motion.spray_on[0, 0]
-            pitch = nominal_pitch(job.tile.width, tip=job.gun.tip, raster=job.raster)
+            pitch = SpraySettings(job.gun.tip, job.raster).nominal_pitch(job.tile.width)
             add_paint(viewer, log.program, pitch=pitch, start=float(began))
         viewer.PublishRecording()
         folder.write_text(SCENE, viewer.StaticHtml())

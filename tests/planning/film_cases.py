@@ -5,12 +5,13 @@ import numpy as np
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.film.film_model import FilmModel, Site
 from painter.planning.spray_path import Stroke
-from painter.planning.strokes.raster import raster_film
+from painter.planning.strokes.spray_settings import SpraySettings
 
 CELL = 0.01
 TIP = TipConfig()
 RASTER = RasterConfig()
-NOMINAL = raster_film(2.0, tip=TIP, raster=RASTER)
+SPRAY = SpraySettings(TIP, RASTER)
+NOMINAL = SPRAY.nominal_film(2.0)
 
 
 def model(mask, height=None):
@@ -19,7 +20,7 @@ def model(mask, height=None):
 
 
 def wall(*keepouts):
-    """A 2 x 2 m wall with rectangles (x, y, width, height), m, that stay clean."""
+    """A 2 x 2 m wall with rectangles (x, y, width, height), m, of keep-out."""
     mask = np.ones((200, 200), dtype=bool)
     for x, y, w, h in keepouts:
         rows = slice(round(y / CELL), round((y + h) / CELL))

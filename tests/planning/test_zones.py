@@ -8,6 +8,7 @@ from painter.errors import InputError
 from painter.planning.config import RasterConfig, TipConfig, ZoneConfig
 from painter.planning.film.tips import airless_tip
 from painter.planning.strokes.raster import plan_strokes
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.zones import in_zones
 
 MASK = np.ones((200, 200), dtype=bool)
@@ -31,7 +32,7 @@ def test_only_included_polygons_are_painted_less_what_is_excluded():
 def test_strokes_keep_out_of_a_zone():
     zone = ZoneConfig(corners=[[0.5, 0.0], [2.0, 2.0]])
     strokes = plan_strokes(
-        MASK, 0.01, tip=TipConfig(), raster=RasterConfig(zones=[zone])
+        MASK, 0.01, SpraySettings(TipConfig(), RasterConfig(zones=[zone]))
     )
     assert strokes and max(s.start_T[0] for s in strokes) < 0.5
 

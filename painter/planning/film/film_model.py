@@ -1,10 +1,10 @@
-"""Film of strokes on what was seen of a tile: shaded by what stands out, fast to vary.
+"""Film of strokes on a tile as it was seen: shaded by what stands out, fast to vary.
 
 `deposition` gives the film on a bare plane. Here the fan lands on a height field, row
 by row: along the fan's long axis a ray lands on the first column in its way, in closed
-form, and across it the fan's thickness blurs the stroke's ends. A stroke may lean, its
-fan stays level: each row sees the same fan at another place. Film is given as a share
-of the nominal film.
+form, and across it the fan's thickness blurs the stroke's ends. A stroke may be
+slanted; its fan stays level, so each row gets the same fan at another place. Film is
+given as a share of the nominal film.
 """
 
 import functools
@@ -21,9 +21,8 @@ from painter.planning.film.deposition import half_axes
 from painter.planning.spray_path import Stroke
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
-# Beyond the tile's edges by so much the film is looked at, m: more than half a fan.
-MARGIN = 0.14
-_STANDS_OUT = 0.02  # m before the wall; less than that hardly shades it.
+MARGIN = 0.14  # m around the tile on which film is counted: more than half a fan.
+_STANDS_OUT = 0.02  # m in front of the wall; less than that hardly shades it.
 _TABLE = np.linspace(-1.0, 1.0, 2001)
 _BLOCK = 16  # Rows of a line that are made together.
 
@@ -35,19 +34,19 @@ def margin_cells(cell: float) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Site(FrozenValue):
-    """A tile and a margin around it, as far as spraying is concerned.
+    """A tile and a margin around it, for planning its film.
 
     Attributes:
-        wanted: (ny, nx) bool, to be painted.
-        clean: (ny, nx) bool, in the tile and to stay clean.
+        paintable: (ny, nx) bool, to be painted.
+        keepout: (ny, nx) bool, the rest of the tile.
         height: (ny, nx) m, along T z.
         nearest: (ny, nx) m, least stand-off from which the arm can spray there.
         cell: Edge of a cell, m; cell (0, 0) begins at -`border` cells in T.
         border: Cells of margin on each side.
     """
 
-    wanted: BoolArray
-    clean: BoolArray
+    paintable: BoolArray
+    keepout: BoolArray
     height: FloatArray
     nearest: FloatArray
     cell: float
@@ -66,19 +65,19 @@ class Site(FrozenValue):
         Args:
             mask: (ny, nx) bool, True = to be painted.
             cell: Edge of a cell, m.
-            height: (ny, nx) m along T z, NaN = nothing seen there; what lies
-                farther back than the margin is taken there. None = a plane.
+            height: (ny, nx) m along T z, NaN = nothing seen there; none is taken to
+                lie farther back than `MARGIN`. None = a plane.
             nearest: (ny, nx) m, on the tile and the margin, the least stand-off that
                 the arm's reach allows; None = any.
         """
         border = margin_cells(cell)
-        wanted = np.pad(mask, border)
+        paintable = np.pad(mask, border)
         flat = np.zeros(mask.shape) if height is None else np.where(mask, 0.0, height)
         return cls(
-            wanted=wanted,
-            clean=np.pad(~mask, border),
+            paintable=paintable,
+            keepout=np.pad(~mask, border),
             height=np.pad(np.fmax(flat, -MARGIN), border),
-            nearest=np.zeros(wanted.shape) if nearest is None else nearest,
+            nearest=np.zeros(paintable.shape) if nearest is None else nearest,
             cell=cell,
             border=border,
         )
@@ -90,46 +89,43 @@ class Site(FrozenValue):
 
     @functools.cached_property
     def deepest(self) -> float:
-        """The lowest height, or the wall's own, 0, m."""
+        """The lowest height, at most that of the wall, 0, m."""
         return min(float(self.height.min()), 0.0)
 
     @functools.cached_property
     def steps(self) -> BoolArray:
-        """(ny, nx) bool, where the height is another than on the row below."""
+        """(ny, nx) bool, where the height differs from that of the row below."""
         steps = np.ones(self.height.shape, dtype=bool)
         steps[1:] = self.height[1:] != self.height[:-1]
         return steps
 
     def row(self, y: float) -> int:
-        """Returns the row at `y`, m in T, or the end that it is beyond."""
+        """Returns the row at `y`, m in T, at least 0 and at most the row count."""
         row = math.floor(y / self.cell) + self.border
-        if row < 0:
-            return 0
-        count = len(self.height)
-        return row if row < count else count
+        return min(max(row, 0), len(self.height))
 
     @functools.cached_property
     def x(self) -> FloatArray:
         """(nx,) m, centres of the columns in T."""
         return np.asarray(
-            (np.arange(self.wanted.shape[1]) - self.border + 0.5) * self.cell
+            (np.arange(self.paintable.shape[1]) - self.border + 0.5) * self.cell
         )
 
     @functools.cached_property
     def y(self) -> FloatArray:
         """(ny,) m, centres of the rows in T."""
         return np.asarray(
-            (np.arange(self.wanted.shape[0]) - self.border + 0.5) * self.cell
+            (np.arange(self.paintable.shape[0]) - self.border + 0.5) * self.cell
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Line(FrozenValue):
-    """What the fan leaves on each cell in passing along a line.
+    """The film that the fan leaves on each cell in passing along a line.
 
     Attributes:
         columns: First and end column of the window.
-        first_row: Of the k rows of the site that it was made on.
+        first_row: First of the k rows of the site that it was made on.
         film: (k, n) film of an endless stroke with full flow.
         thickness: (k, n) m, half the fan's thickness as it passes over each cell.
     """
@@ -140,19 +136,19 @@ class Line(FrozenValue):
     thickness: FloatArray
 
     def own(self, rows: slice) -> slice:
-        """Returns where rows of the site are among its own."""
+        """Returns rows of the site counted from the line's first row."""
         return slice(rows.start - self.first_row, rows.stop - self.first_row)
 
 
 class _Ground(NamedTuple):
-    """What an upright line goes over: j different rows of the k that it was made on.
+    """The ground under an upright line: the j distinct rows of its k rows.
 
     Attributes:
         columns: First and end column of the window.
-        edges: (2 `reach` + 2,) columns, of which the fan's rays reach those between.
-        height: (j, 2 `reach` + 1) m, of these.
+        edges: (2 `reach` + 2,) edges, in columns, of the columns that rays reach.
+        height: (j, 2 `reach` + 1) m, of these columns.
         recess: (j, n) m, heights of the window that are below the wall, else 0.
-        which: (k,) of the j that each row is.
+        which: (k,) which of the j distinct rows each row equals.
     """
 
     columns: tuple[int, int]
@@ -169,11 +165,11 @@ class _Ground(NamedTuple):
 
 
 def _ground_under(site: Site, middle: int, reach: int, low: int, high: int) -> _Ground:
-    """Returns what lies under an upright line over a column, on rows of a site."""
-    count = site.wanted.shape[1]
+    """Returns the ground under an upright line over a column, on rows of a site."""
+    count = site.paintable.shape[1]
     first = min(max(middle - reach, 0), count - 1)
     end = min(max(middle + reach, first) + 1, count)
-    # Rows that are as the one below them are looked at once.
+    # A row that equals the one below it is evaluated once.
     new: BoolArray = np.array(site.steps[low:high, first:end].any(axis=1))
     new[0] = True
     rows = low + np.flatnonzero(new)
@@ -228,7 +224,7 @@ class FilmModel:
         self,
         x_line: float,
         standoff: float,
-        lean: float = 0.0,
+        slant: float = 0.0,
         rows: slice | None = None,
     ) -> Line:
         """Returns a line.
@@ -236,14 +232,14 @@ class FilmModel:
         Args:
             x_line: Where it meets T y = 0, m in T.
             standoff: From which it is sprayed, m.
-            lean: By how much it goes to the right in going up, m/m.
-            rows: Those of the site that are wanted; None = all.
+            slant: How far it goes to the right, m per m up.
+            rows: Rows of the site to make it on; None = all.
         """
         first, stop = 0, len(self.site.y)
         if rows is not None:
             first = rows.start // _BLOCK * _BLOCK
             stop = min(-(-rows.stop // _BLOCK) * _BLOCK, stop)
-        key = (round(x_line, 4), round(standoff, 4), round(lean, 4), first, stop)
+        key = (round(x_line, 4), round(standoff, 4), round(slant, 4), first, stop)
         if key not in self._lines:
             self._lines[key] = self._make_line(*key)
         return self._lines[key]
@@ -251,12 +247,12 @@ class FilmModel:
     def below(self, line: Line, rows: slice, end: float) -> FloatArray:
         """Returns the share of the fan that lies below each cell.
 
-        A stroke leaves the share of a line's film that lies below with the fan at its
-        lower end, and no longer with the fan at its upper one.
+        A stroke leaves the share of a line's film that lies below the fan at its upper
+        end, less the share that lies below it at its lower end.
 
         Args:
             line: The line.
-            rows: Those of the site that are looked at, k of them.
+            rows: Rows of the site, k of them.
             end: Where on the line the spray axis is, m in T y.
 
         Returns:
@@ -269,14 +265,14 @@ class FilmModel:
 
     def film(self, strokes: Sequence[Stroke]) -> FloatArray:
         """Returns the film of strokes on the site, (ny, nx), as share of nominal."""
-        film = np.zeros(self.site.wanted.shape)
+        film = np.zeros(self.site.paintable.shape)
         for stroke in strokes:
             x, y = (float(value) for value in stroke.start_T)
             x_end, y_end = (float(value) for value in stroke.end_T)
-            lean = (x_end - x) / (y_end - y)
+            slant = (x_end - x) / (y_end - y)
             low, high = min(y, y_end), max(y, y_end)
             rows = self.rows(low, high, stroke.standoff)
-            line = self.line(x - lean * y, stroke.standoff, lean, rows)
+            line = self.line(x - slant * y, stroke.standoff, slant, rows)
             share = self.below(line, rows, low) - self.below(line, rows, high)
             scale = stroke.flow * self._speed / stroke.speed
             film[rows, slice(*line.columns)] += (
@@ -285,20 +281,20 @@ class FilmModel:
         return film
 
     def _make_line(
-        self, x_line: float, standoff: float, lean: float, low: int, high: int
+        self, x_line: float, standoff: float, slant: float, low: int, high: int
     ) -> Line:
         """Makes a line on the rows from `low` up to `high`."""
         a, _ = half_axes(self._tip, standoff)
-        # What lies back is reached by rays that went past the fan's width on the wall.
+        # A recess is reached by rays beyond the fan's width on the wall.
         reach = math.ceil((1.0 - self.site.deepest / standoff) * a / self.site.cell) + 1
-        if lean == 0.0:
+        if slant == 0.0:
             return self._make_upright(x_line, standoff, reach, low, high)
-        return self._make_leaning(x_line, standoff, lean, reach, low, high)
+        return self._make_slanted(x_line, standoff, slant, reach, low, high)
 
     def _make_upright(
         self, x_line: float, standoff: float, reach: int, low: int, high: int
     ) -> Line:
-        """Makes a line that goes straight up: all rows have the same columns."""
+        """Makes an upright line: all rows have the same columns."""
         site, cell = self.site, self.site.cell
         middle = math.floor(x_line / cell) + site.border
         key = (middle, reach, low, high)
@@ -317,19 +313,19 @@ class FilmModel:
             ground.columns, low, ground.on_rows(landed), ground.on_rows(thickness)
         )
 
-    def _make_leaning(
+    def _make_slanted(
         self,
         x_line: float,
         standoff: float,
-        lean: float,
+        slant: float,
         reach: int,
         low: int,
         high: int,
     ) -> Line:
-        """Makes a line that goes across as it goes up: each row has its own columns."""
+        """Makes a slanted line: each row has its own columns."""
         site, cell = self.site, self.site.cell
-        count = site.wanted.shape[1]
-        axis = (x_line + lean * site.y[low:high])[:, None]
+        count = site.paintable.shape[1]
+        axis = (x_line + slant * site.y[low:high])[:, None]
         middle = np.floor(axis / cell).astype(int) + site.border
         columns = middle + np.arange(-reach, reach + 1)
         inside = np.minimum(np.maximum(columns, 0), count - 1)
@@ -337,8 +333,8 @@ class FilmModel:
         edges = (columns[:, :1] - site.border) * cell - axis
         edges = edges + cell * np.arange(2 * reach + 2)
         share = self._shares(standoff - height, edges, standoff, reach)
-        # Leaning, a metre of the stroke is less than a metre up.
-        share *= math.hypot(1.0, lean) * self._dose / cell
+        # A metre of a slanted stroke is less than a metre up.
+        share *= math.hypot(1.0, slant) * self._dose / cell
 
         leftmost, rightmost = sorted((int(middle[0, 0]), int(middle[-1, 0])))
         first = min(max(leftmost - reach, 0), count - 1)
@@ -357,7 +353,7 @@ class FilmModel:
         Args:
             offset: Of the cells from the fan's axis, m.
             drop: Nozzle over each, m: the farther, the thicker the fan. What stands
-                out counts as the wall: its sides catch what would pass it.
+                out counts as wall: its sides catch the rays that would pass it.
         """
         a, b = half_axes(self._tip, 1.0)
         off = offset / (a * drop)
@@ -378,7 +374,7 @@ class FilmModel:
         a, _ = half_axes(self._tip, standoff)
         drop = np.maximum(drop, 1e-6)
         # The steepest ray that has landed by each column's far edge, on either side of
-        # the axis; a column higher than the nozzle stops them all.
+        # the axis; a column higher than the nozzle stops all rays.
         steepest = np.empty((2, len(drop), reach + 1))
         np.divide(edges[..., reach + 1 :], drop[:, reach:], out=steepest[0])
         np.divide(-edges[..., reach::-1], drop[:, reach::-1], out=steepest[1])

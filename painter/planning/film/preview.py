@@ -77,5 +77,5 @@ def preview_film(
         film=film * nominal,
         cell=site.cell,
         border=site.border,
-        figures=FilmFigures.of(film[site.wanted], film[site.clean], film.sum()),
+        figures=FilmFigures.of(film[site.paintable], film[site.keepout], film.sum()),
     )

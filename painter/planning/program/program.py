@@ -21,7 +21,8 @@ from painter.planning.motion.verify import verify_motion, verify_strokes
 from painter.planning.program.clear_strokes import RUN_OUT, clear_strokes
 from painter.planning.program.stroke_links import connect_strokes
 from painter.planning.spray_path import PaintProgram, Stroke
-from painter.planning.strokes.raster import plan_strokes, raster_film
+from painter.planning.strokes.raster import plan_strokes
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.strokes.touch_up import touch_up_strokes
 from painter.planning.tile import cell_centres
 from painter.planning.zones import in_zones
@@ -59,13 +60,17 @@ class ProgramPlanner(FrozenValue):
         return plan_strokes(
             np.asarray(segmentation.wall_mask),
             segmentation.cell,
-            tip=self.tip,
-            raster=self.raster,
+            self.spray,
             height=above_wall(segmentation),
             nearest=self._nearest(segmentation),
         )
 
-    def wanted(self, segmentation: WallSegmentation) -> BoolArray:
+    @property
+    def spray(self) -> SpraySettings:
+        """The tip and the settings of its strokes."""
+        return SpraySettings(self.tip, self.raster)
+
+    def paintable(self, segmentation: WallSegmentation) -> BoolArray:
         """Returns the wall (ny, nx) that the operator's zones leave to be painted."""
         mask = np.asarray(segmentation.wall_mask)
         return in_zones(mask, segmentation.cell, self.raster.zones)
@@ -80,7 +85,7 @@ class ProgramPlanner(FrozenValue):
             film: m, on the tile and `margin_cells` around it.
         """
         site = Site.of_tile(
-            self.wanted(segmentation),
+            self.paintable(segmentation),
             segmentation.cell,
             above_wall(segmentation),
             self._nearest(segmentation),
@@ -88,15 +93,14 @@ class ProgramPlanner(FrozenValue):
         return touch_up_strokes(
             film,
             site,
+            self.spray,
             nominal=self.nominal_film(segmentation),
-            tip=self.tip,
-            raster=self.raster,
         )
 
     def nominal_film(self, segmentation: WallSegmentation) -> float:
         """Returns the wet film that the raster of a tile aims at, m."""
         width = segmentation.wall_mask.shape[1] * segmentation.cell
-        return raster_film(width, tip=self.tip, raster=self.raster)
+        return self.spray.nominal_film(width)
 
     def program(
         self, wanted: Sequence[Stroke], segmentation: WallSegmentation, q0: FloatArray

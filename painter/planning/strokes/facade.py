@@ -1,11 +1,11 @@
 """A wall wider or higher than one tile: base positions, and strokes without a seam.
 
-All base positions share one grid of lines over the whole wall, and a line belongs to
-one base_position alone: beside one another they join as the lines of one tile do. Above
-one another strokes end in a ramp, their flow falling in steps over the overlap while
-that of the next base position's strokes rises: there an error of place makes a fraction
-of the bead or gap that two blunt ends would make. Where windows and doors are known,
-lines are cut at them, and places with nothing to paint get no base_position.
+All base positions share one grid of lines over the whole wall, and each line belongs to
+one of them: side by side they join as the lines of one tile do. One above the other,
+strokes end in a ramp: their flow falls in steps over the overlap while that of the next
+base position's strokes rises. An error of the base's place then makes a fraction of the
+bead or gap that two blunt ends would make. Lines are cut at known windows and doors,
+and places with nothing to paint get no base position.
 """
 
 import math
@@ -14,13 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from painter.planning.config import RasterConfig, TileConfig, TipConfig, ZoneConfig
+from painter.planning.config import TileConfig, ZoneConfig
 from painter.planning.spray_path import Stroke
-from painter.planning.strokes.stroke_lines import nominal_pitch, wall_share
+from painter.planning.strokes.spans import runs
+from painter.planning.strokes.spray_settings import SpraySettings
+from painter.planning.strokes.stroke_lines import wall_share
 from painter.planning.zones import in_zones
 from perception.ground import FloatArray, FrozenValue
 
-_OVERLAP = 0.20  # m, height over which strokes of two base_positions blend,
+_OVERLAP = 0.20  # m, height over which strokes of two base positions blend,
 _RAMP_STEPS = 4  # and the steps in which their flow falls and rises.
 _CELL = 0.01  # m, of the grid on which zones are drawn.
 
@@ -33,13 +35,13 @@ class BasePosition(FrozenValue):
     robot.
 
     Attributes:
-        left: Left edge of the base_position's tile, m.
+        left: Left edge of the base position's tile, m.
         bottom: Lower edge, m.
         width: Of the tile, m.
         height: Of the tile, overlaps included, m.
         base_x: Where the base axis stands, m to the right of the wall's left edge.
-        lift: How much higher than on the floor the platform stands, m.
-        strokes: In the base_position's own tile frame T.
+        lift: Height of the platform over the floor, m.
+        strokes: In the base position's own tile frame T.
     """
 
     left: float
@@ -63,45 +65,43 @@ class BasePosition(FrozenValue):
 def plan_base_positions(
     width: float,
     height: float,
+    spray: SpraySettings,
     *,
     tile: TileConfig,
-    tip: TipConfig,
-    raster: RasterConfig,
     zones: Sequence[ZoneConfig] = (),
 ) -> tuple[BasePosition, ...]:
     """Divides a wall into base positions and lays strokes that join without a seam.
 
-    What each base position finds on its tile cuts its strokes further.
+    On the robot, what each base position sees on its tile cuts its strokes further.
 
     Args:
         width: Of the wall, m.
         height: Of the wall, m.
+        spray: The tip and the settings of its strokes.
         tile: Largest tile that one base position paints, and its height over the floor
-        or
-            platform that the arm stands on.
-        tip: The spray tip.
-        raster: Settings of the strokes.
-        zones: What of the wall is to be painted or left, on its own axes.
+            or platform that the arm stands on.
+        zones: Zones to include and to exclude, on the wall's own axes.
 
     Returns:
-        Base positions in order of execution: row by row from below, to and fro.
+        Base positions in order of execution: row by row from below, back and forth.
 
     Raises:
         ValueError: The wall or the tile is too small for a line or an overlap, or
-            several coats are wanted.
+            there are several coats.
     """
+    raster = spray.raster
     if raster.coats > 1:
         raise ValueError(
             f"raster.coats must be 1 for several base positions, got {raster.coats!r}."
         )
-    pitch = nominal_pitch(width, tip=tip, raster=raster)
+    pitch = spray.nominal_pitch(width)
     lines = round(width / pitch)
     in_tile = math.floor(tile.width / pitch + 1e-9)
     if in_tile < 1 or tile.height <= 2.0 * _OVERLAP or height <= 0.0:
         raise ValueError(
             f"a tile of {tile.width:.2f} x {tile.height:.2f} m cannot divide a wall of "
-            f"{width:.2f} x {height:.2f} m: it must hold a line each {pitch:.2f} m and "
-            f"two overlaps of {_OVERLAP:.2f} m."
+            f"{width:.2f} x {height:.2f} m: it must be at least one pitch wide, "
+            f"{pitch:.2f} m, and higher than two overlaps of {_OVERLAP:.2f} m."
         )
     columns = math.ceil(lines / in_tile)
     edges = np.round(np.linspace(0, lines, columns + 1)).astype(int)
@@ -110,7 +110,7 @@ def plan_base_positions(
         rows = math.ceil((height - _OVERLAP) / (tile.height - _OVERLAP) - 1e-9)
     step = (height - _OVERLAP) / rows if rows > 1 else height
     x_lines = pitch * np.arange(0.5, lines)
-    painted = _painted(x_lines, width, height, zones, tip=tip, raster=raster)
+    paintable = _paintable_spans(x_lines, width, height, zones, spray)
     base_positions: list[BasePosition] = []
     for row in range(rows):
         bottom = row * step
@@ -131,7 +131,7 @@ def plan_base_positions(
                 )
                 for line in range(first, last)
                 for low, high, flow in _within(
-                    spans, painted[line] - bottom, raster.min_stroke
+                    spans, paintable[line] - bottom, raster.min_stroke
                 )
             ]
             if not strokes:
@@ -150,41 +150,35 @@ def plan_base_positions(
     return tuple(base_positions)
 
 
-def _painted(
+def _paintable_spans(
     x_lines: FloatArray,
     width: float,
     height: float,
     zones: Sequence[ZoneConfig],
-    *,
-    tip: TipConfig,
-    raster: RasterConfig,
+    spray: SpraySettings,
 ) -> list[FloatArray]:
-    """Returns for each line the stretches (k, 2), m, on which the gun may be open."""
+    """Returns for each line the spans (k, 2), m, on which the gun may be open."""
+    tip, raster = spray
     shape = (max(1, round(height / _CELL)), max(1, round(width / _CELL)))
     bare = np.ones(shape, dtype=bool)
-    standoff = raster.standoff
     flow = [
-        wall_share(mask, _CELL, x_lines, tip=tip, standoff=standoff)
+        wall_share(mask, _CELL, x_lines, tip=tip, standoff=raster.standoff)
         for mask in (in_zones(bare, _CELL, zones), bare)
     ]
     # At the wall's own edges part of the fan goes past it either way.
     on = flow[0] >= raster.wall_share * flow[1]
-    stretches = []
-    for column in on.T:
-        edges = np.flatnonzero(np.diff(column, prepend=False, append=False))
-        ends = edges.reshape(-1, 2) * _CELL + np.array([-raster.lead, raster.lead])
-        stretches.append(ends)
-    return stretches
+    leads = np.array([-raster.lead, raster.lead])
+    return [np.reshape(runs(column), (-1, 2)) * _CELL + leads for column in on.T]
 
 
 def _within(
-    spans: list[tuple[float, float, float]], stretches: FloatArray, shortest: float
+    spans: list[tuple[float, float, float]], allowed: FloatArray, shortest: float
 ) -> list[tuple[float, float, float]]:
-    """Returns the parts of spans (low, high, flow) that lie in stretches (k, 2)."""
+    """Returns the parts of spans (low, high, flow) that lie in allowed ones (k, 2)."""
     parts = [
         (max(low, float(start)), min(high, float(end)), flow)
         for low, high, flow in spans
-        for start, end in stretches
+        for start, end in allowed
     ]
     return [part for part in parts if part[1] - part[0] >= shortest]
 

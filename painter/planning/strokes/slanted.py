@@ -1,47 +1,47 @@
-"""Lines along the sides of what leans: a stick, a rotated box, a wall hung askew."""
+"""Lines along slanted sides: of a stick, a rotated box, a wall hung askew."""
 
 import numpy as np
 from scipy.ndimage import find_objects, label
 
 from painter.planning.film.film_model import Site
-from painter.planning.strokes.film_fit import MOST_LEAN
+from painter.planning.strokes.film_fit import MOST_SLANT
 from perception.ground import BoolArray, FloatArray
 
-# Sides of what stays clean along which lines lean: at least so long and so straight, in
-# cells, and leaning more than fitting alone would find, m/m.
+# Sides of keep-outs that get slanted lines: at least so long and so straight, in cells,
+# and more slanted than fitting alone would find, m/m.
 _LONG_SIDE = 12
 _STRAIGHT = 1.3
-_LEAST_LEAN = 0.04
+_LEAST_SLANT = 0.04
 
 
 def slanted_lines(
     site: Site, reach: float, spacing: float
 ) -> list[tuple[float, FloatArray]]:
-    """Returns lines along what leans: their lean and where they meet T y = 0, m.
+    """Returns lines along slanted sides: their slant and where they meet T y = 0, m.
 
-    A side of what stays clean leans if a straight line runs along it, cell by cell.
+    A side of a keep-out is slanted if a straight line runs along it, cell by cell.
 
     Args:
         site: The tile.
-        reach: How far beside such things lines are tried, m.
+        reach: How far beside keep-outs lines are tried, m.
         spacing: Between lines, m.
     """
     lines: list[tuple[float, FloatArray]] = []
-    regions, _ = label(site.clean)
+    regions, _ = label(site.keepout)
     for number, (rows, columns) in enumerate(find_objects(regions), start=1):
         region = regions[rows, columns] == number
         left, right = site.x[columns.start], site.x[columns.stop - 1]
-        for lean in _leans(region):
+        for slant in _slants(region):
             y = 0.5 * (site.y[rows.start] + site.y[rows.stop - 1])
-            slack = reach + 0.5 * abs(lean) * (rows.stop - rows.start) * site.cell
+            slack = reach + 0.5 * abs(slant) * (rows.stop - rows.start) * site.cell
             count = round((right - left + 2.0 * slack) / spacing)
             x = np.linspace(left - slack, right + slack, count + 1)
-            lines.append((lean, x - lean * y))
+            lines.append((slant, x - slant * y))
     return lines
 
 
-def _leans(region: BoolArray) -> set[float]:
-    """Returns by how much sides of a region go to the right in going up, m/m."""
+def _slants(region: BoolArray) -> set[float]:
+    """Returns the slants of a region's sides, m to the right per m up."""
     found: set[float] = set()
     for side in (region.argmax(axis=1), -region[:, ::-1].argmax(axis=1)):
         farthest = int(side.argmin())
@@ -51,8 +51,8 @@ def _leans(region: BoolArray) -> set[float]:
             y = np.arange(x.size)
             if x.size < _LONG_SIDE:
                 continue
-            lean, start = np.polyfit(y, x, 1)
-            straight = np.abs(x - start - lean * y).max() < _STRAIGHT
-            if straight and _LEAST_LEAN < abs(lean) < MOST_LEAN:
-                found.add(round(float(lean), 2))
+            slant, start = np.polyfit(y, x, 1)
+            straight = np.abs(x - start - slant * y).max() < _STRAIGHT
+            if straight and _LEAST_SLANT < abs(slant) < MOST_SLANT:
+                found.add(round(float(slant), 2))
     return found

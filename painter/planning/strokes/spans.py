@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from painter.planning.film.film_model import FilmModel, Line
-from perception.ground import FloatArray
+from perception.ground import BoolArray, FloatArray
 
 
 class Span(NamedTuple):
     """A stroke while it is fitted; m, flow as share of nominal.
 
-    It goes up from T y `low` to `high`, and by `lean` to the right for each metre up;
+    It goes up from T y `low` to `high`, and `slant` m to the right for each metre up;
     `x` is where its line meets T y = 0.
     """
 
@@ -20,11 +20,11 @@ class Span(NamedTuple):
     high: float
     standoff: float
     flow: float
-    lean: float = 0.0
+    slant: float = 0.0
 
     def x_at(self, y: float) -> float:
-        """Returns the place across at T y, m."""
-        return self.x + self.lean * y
+        """Returns T x at T y, m."""
+        return self.x + self.slant * y
 
     @property
     def length(self) -> float:
@@ -56,13 +56,13 @@ class Window(NamedTuple):
         )
 
     def cut(self, rows: slice) -> "Window":
-        """Returns what of it lies in some rows; it may be empty."""
+        """Returns its part in some rows; it may be empty."""
         start = max(self.rows.start, rows.start)
         stop = max(min(self.rows.stop, rows.stop), start)
         return Window(slice(start, stop), self.columns)
 
     def part(self, film: FloatArray, other: "Window") -> FloatArray:
-        """Returns what of a film on this window lies in another, too."""
+        """Returns the part of a film on this window that lies in another one, too."""
         (rows, columns), (other_rows, other_columns) = self, other
         first, left = other_rows.start - rows.start, other_columns.start - columns.start
         return film[
@@ -71,10 +71,17 @@ class Window(NamedTuple):
         ]
 
 
+def runs(on: BoolArray) -> list[list[int]]:
+    """Returns the runs of True in a row (n,): first index and end of each."""
+    edges = np.flatnonzero(np.diff(on, prepend=False, append=False))
+    pairs: list[list[int]] = edges.reshape(-1, 2).tolist()
+    return pairs
+
+
 def reached(model: FilmModel, span: Span) -> tuple[Line, Window]:
     """Returns a span's line and the cells that its film reaches."""
     rows = model.rows(span.low, span.high, span.standoff)
-    line = model.line(span.x, span.standoff, span.lean, rows)
+    line = model.line(span.x, span.standoff, span.slant, rows)
     return line, Window(rows, slice(*line.columns))
 
 

@@ -2,11 +2,11 @@
 
 All strokes lie on one set of lines over the whole tile; restarting the lines beside
 every opening would break the overlap that makes the film even. An edge of the wall that
-runs along the lines wants one at the right distance: nearer and the fan paints what
-must stay clean, farther and a strip stays bare. `place_lines` weighs that for all edges
-at once. What two neighbouring lines leave bare depends on these two alone, so the best
-set is a shortest path from the tile's left edge to its right one, which dynamic
-programming finds exactly.
+runs along the lines needs one at the right distance: nearer, the fan paints the
+keep-out; farther, a strip stays bare. `place_lines` weighs that for all edges at once.
+What two neighbouring lines leave bare depends on these two alone, so the best set is a
+shortest path from the tile's left edge to its right one, which dynamic programming
+finds exactly.
 """
 
 import math
@@ -14,46 +14,30 @@ import math
 import numpy as np
 from scipy.special import beta
 
-from painter.planning.config import RasterConfig, TipConfig
-from painter.planning.film.deposition import best_pitch, flow_share, half_axes
+from painter.planning.config import TipConfig
+from painter.planning.film.deposition import flow_share, half_axes
 from painter.planning.film.figures import COVERED
+from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.tile import cell_centres
 from perception.ground import BoolArray, FloatArray, IntArray
 
-# Costs are areas: wall left bare counts once; paint beside the wall by the area that it
-# could have painted, times the first weight (higher trades coverage for less
-# overspray); wall whose film is uneven by the square of that, times the second. Chosen
-# by benchmarks/findings/strokes.py so that every named scene keeps clear of both
-# bounds.
+# Costs are areas. Wall left bare counts once. Paint beside the wall counts by the area
+# that it could have painted, times the first weight: a higher one trades coverage for
+# less overspray. Wall whose film is uneven counts by the square of that, times the
+# second.
+# Source: chosen by benchmarks/findings/strokes.py so that every named scene keeps clear
+# of both bounds.
 _OVERSPRAY_WEIGHT = 1.85
 _UNEVENNESS_WEIGHT = 0.25
-# Steps a pitch is divided into, the closest lines in steps, and how far the pitch may
-# exceed the widest: the film's variation then grows by less than one percentage point
-# at gamma = 2 (`raster_cv`).
+# Steps that a pitch is divided into, the closest lines in steps, and how far the pitch
+# may exceed the widest: the film's variation then grows by less than one percentage
+# point at gamma = 2 (`raster_cv`).
 _STEPS = 64
 _CLOSEST = 40
 _PITCH_SLACK = 0.02
 
 
 EDGE_FLOW = 0.55  # Share of the nominal flow; see `lines_between`.
-
-
-def widest_pitch(tip: TipConfig, raster: RasterConfig) -> float:
-    """Returns the pitch that strokes must not exceed, m."""
-    return raster.overlap_pitch or best_pitch(tip, raster.standoff)
-
-
-def nominal_pitch(width: float, *, tip: TipConfig, raster: RasterConfig) -> float:
-    """Returns the pitch spread to fill a tile's width exactly, m.
-
-    The film aimed at is `mean_film` at this pitch.
-
-    Args:
-        width: Of the tile, m.
-        tip: The spray tip.
-        raster: `overlap_pitch` is the widest pitch; 0 = the pitch of least variance.
-    """
-    return width / math.ceil(width / widest_pitch(tip, raster) - 1e-9)
 
 
 def wall_share(
@@ -77,46 +61,44 @@ def wall_share(
     return np.asarray(mask @ flow)
 
 
-def place_lines(
-    mask: BoolArray, cell: float, *, tip: TipConfig, raster: RasterConfig
-) -> FloatArray:
+def place_lines(mask: BoolArray, cell: float, spray: SpraySettings) -> FloatArray:
     """Places the lines of a raster.
 
     Args:
         mask: (ny, nx) bool, True = to be painted, row 0 at the bottom of the tile.
         cell: Edge of a cell, m.
-        tip: The spray tip, its fan's long axis along T x.
-        raster: Settings of the raster.
+        spray: The tip and the settings of its strokes.
 
     Returns:
         (n,) m, x of the lines in T, ascending; nearly evenly spaced, never wider apart
         than the widest pitch and its slack.
     """
+    tip, raster = spray
     width = mask.shape[1] * cell
-    pitch = nominal_pitch(width, tip=tip, raster=raster)
+    pitch = spray.nominal_pitch(width)
     step = pitch / _STEPS
     lines = step * np.arange(round(width / step) + 1)
-    # Equal rows are looked at once.
+    # Equal rows are evaluated once.
     rows, repeats = np.unique(mask, axis=0, return_counts=True)
     area = np.asarray(repeats * cell, dtype=np.float64)
     share = wall_share(rows, cell, lines, tip=tip, standoff=raster.standoff)
     on = share >= raster.wall_share
-    spill = area @ np.where(on, 1.0 - share, 0.0) * pitch
+    overspray = area @ np.where(on, 1.0 - share, 0.0) * pitch
 
-    reach = _reach(pitch, tip=tip, raster=raster)
+    reach = _reach(pitch, spray)
     bare = _BareWall(rows, cell, on, area, step=step, reach=reach)
-    widest = math.floor((1.0 + _PITCH_SLACK) * widest_pitch(tip, raster) / step)
+    widest = math.floor((1.0 + _PITCH_SLACK) * spray.widest_pitch / step)
     gaps = np.arange(_CLOSEST, widest + 1)
-    path = _shortest_path(_OVERSPRAY_WEIGHT * spill, bare, gaps)
+    path = _shortest_path(_OVERSPRAY_WEIGHT * overspray, bare, gaps)
     return np.asarray(lines[path])
 
 
 def lines_between(lines: FloatArray, width: float) -> FloatArray:
     """Returns lines half way between those of a raster, for every second coat.
 
-    Beside the tile's left and right edge there is one more each, sprayed with
-    `EDGE_FLOW`: half way between the edge and the raster's own first line it does for
-    the line on the edge itself, which would spray half of its paint past it.
+    Beside the tile's left and right edge there is one more each, half way between the
+    edge and the raster's own first line. Sprayed with `EDGE_FLOW` it replaces a line on
+    the edge itself, which would spray half of its paint past it.
 
     Args:
         lines: (n,) m, ascending x of the raster's lines in T.
@@ -130,15 +112,17 @@ def lines_between(lines: FloatArray, width: float) -> FloatArray:
     return np.concatenate([edges[:1], middles, edges[1:]])
 
 
-def _shortest_path(spill: FloatArray, bare: "_BareWall", gaps: IntArray) -> list[int]:
+def _shortest_path(
+    line_costs: FloatArray, bare: "_BareWall", gaps: IntArray
+) -> list[int]:
     """Returns the places, in steps, of the lines that cost least.
 
     Args:
-        spill: (count,) cost of a line at each place.
+        line_costs: (count,) cost of a line at each place.
         bare: Gives the cost of two neighbours, and of the first and last line.
         gaps: Allowed distances between neighbours, in steps, ascending.
     """
-    count = spill.size
+    count = line_costs.size
     every = np.arange(count)
     near_left, near_right = every <= gaps[-1], count - 1 - every <= gaps[-1]
     first = np.where(near_left, bare.between(np.full(count, -1), every), np.inf)
@@ -151,11 +135,11 @@ def _shortest_path(spill: FloatArray, bare: "_BareWall", gaps: IntArray) -> list
         between[i, gap:] = bare.between(left, right) + uneven * bare.wall(left, right)
 
     # cost[k] is that of the cheapest lines up to one at k, before[k] the one before it.
-    cost = first + spill
+    cost = first + line_costs
     before = np.full(count, -1)
     for k in range(gaps[0], count):
         near = gaps[gaps <= k]
-        ways = cost[k - near] + between[: near.size, k] + spill[k]
+        ways = cost[k - near] + between[: near.size, k] + line_costs[k]
         best = int(np.argmin(ways))
         if ways[best] < cost[k]:
             cost[k], before[k] = ways[best], k - near[best]
@@ -165,16 +149,17 @@ def _shortest_path(spill: FloatArray, bare: "_BareWall", gaps: IntArray) -> list
     return path[::-1]
 
 
-def _reach(pitch: float, *, tip: TipConfig, raster: RasterConfig) -> float:
+def _reach(pitch: float, spray: SpraySettings) -> float:
     """Returns how far from a line one stroke alone covers the wall, m."""
-    a, _ = half_axes(tip, raster.standoff)
-    peak = pitch / (a * beta(0.5, tip.gamma + 1.0))
-    core = 1.0 - (COVERED / peak) ** (1.0 / tip.gamma)
+    gamma = spray.tip.gamma
+    a, _ = half_axes(spray.tip, spray.raster.standoff)
+    peak = pitch / (a * beta(0.5, gamma + 1.0))
+    core = 1.0 - (COVERED / peak) ** (1.0 / gamma)
     return float(a * math.sqrt(max(core, 0.0)))
 
 
 class _BareWall:
-    """Area of wall that neighbouring lines leave bare; lines are counted in steps."""
+    """Area of wall that neighbouring lines leave bare; places are in steps."""
 
     def __init__(
         self,

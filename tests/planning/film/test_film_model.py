@@ -17,7 +17,7 @@ def flat_surface():
     """The site's grid as a surface for rays."""
     site = model(wall()).site
     origin = np.full(2, -site.border * CELL)
-    return SpraySurface(np.zeros(site.wanted.shape), cell=CELL, origin=origin)
+    return SpraySurface(np.zeros(site.paintable.shape), cell=CELL, origin=origin)
 
 
 def nozzle_over(place, standoff):
@@ -59,23 +59,23 @@ def test_a_board_shades_the_wall_behind_it():
     assert film[first_lit + 1] > 0.0
 
 
-def test_a_leaning_stroke_leaves_what_rays_along_it_leave():
+def test_a_slanted_stroke_leaves_what_rays_along_it_leave():
     """The gun goes 1 to the right for 4 up, its fan level all the way."""
-    lean, low, high = 0.25, 0.4, 1.2
+    slant, low, high = 0.25, 0.4, 1.2
     dut = model(wall())
-    leaning = stroke(0.8, low, high, standoff=0.2)
-    leaning = leaning.replace(end_T=np.array([0.8 + lean * (high - low), high]))
-    film = dut.film([leaning])
+    slanted = stroke(0.8, low, high, standoff=0.2)
+    slanted = slanted.replace(end_T=np.array([0.8 + slant * (high - low), high]))
+    film = dut.film([slanted])
     cone, surface = SprayCone(TIP, ray_count=4096), flat_surface()
     count = 160
     shares = np.linspace(0.0, 1.0, count + 1)[:, None]
-    places = leaning.start_T + shares * (leaning.end_T - leaning.start_T)
+    places = slanted.start_T + shares * (slanted.end_T - slanted.start_T)
     landed = np.zeros(film.size)
     for here, there in itertools.pairwise(places):
         rays = cone.rays(*(nozzle_over(place, 0.2) for place in (here, there)))
         cells, volumes, _ = surface.land(*rays)
         landed += np.bincount(cells, weights=volumes, minlength=film.size)
-    dose = TIP.flow * TIP.transfer_efficiency * leaning.length / leaning.speed
+    dose = TIP.flow * TIP.transfer_efficiency * slanted.length / slanted.speed
     exact = landed.reshape(film.shape) * dose / (count * 4096 * CELL**2 * NOMINAL)
     # Rays share their paint with the next cells: 1 cm of a fan of 17 cm.
     np.testing.assert_allclose(film, exact, atol=0.05 * film.max())
@@ -87,8 +87,8 @@ def test_a_line_is_the_same_on_some_rows_as_on_all():
     height[60:140:3, 90:104] = 0.05
     dut = model(height == 0.0, height)
     rows = slice(70, 95)
-    for lean in (0.0, 1e-6, 0.2):
-        whole, some = dut.line(0.9, 0.2, lean), dut.line(0.9, 0.2, lean, rows)
+    for slant in (0.0, 1e-6, 0.2):
+        whole, some = dut.line(0.9, 0.2, slant), dut.line(0.9, 0.2, slant, rows)
         film = np.zeros(height.shape + 2 * np.array(dut.site.border))
         film[:, slice(*whole.columns)] = whole.film
         film[rows, slice(*some.columns)] -= some.film[some.own(rows)]
@@ -99,10 +99,10 @@ def test_a_line_is_the_same_on_some_rows_as_on_all():
         np.testing.assert_array_equal(some.thickness[some.own(rows)], cut)
 
 
-@pytest.mark.parametrize("lean", [0.0, 0.1])
+@pytest.mark.parametrize("slant", [0.0, 0.1])
 @pytest.mark.parametrize("x_line", [-1.0, 3.0])
-def test_a_line_beside_the_site_leaves_nothing_on_it(x_line, lean):
-    assert not model(wall()).line(x_line, 0.3, lean).film.any()
+def test_a_line_beside_the_site_leaves_nothing_on_it(x_line, slant):
+    assert not model(wall()).line(x_line, 0.3, slant).film.any()
 
 
 def test_nearer_and_weaker_leaves_a_narrower_film_as_thick():

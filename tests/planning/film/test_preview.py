@@ -1,4 +1,4 @@
-"""The film as planned: the map is that of the strokes, wherever it is looked at."""
+"""The film as planned: its map is that of the strokes, wherever it is sampled."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_film_is_found_again_in_tile_coordinates(make_wall):
     )
 
 
-def test_paint_on_what_stays_clean_is_counted(make_wall):
+def test_paint_on_the_keepout_is_counted(make_wall):
     wall = make_wall((slice(50, 150), slice(100, 200), 0.0))
     strokes = [Stroke(np.array([1.0, 0.0]), np.array([1.0, 2.0]), 0.6, "body", 0)]
     dut = preview_film(strokes, wall, tip=TIP, nominal=NOMINAL)

@@ -100,7 +100,7 @@ def test_planned_film_is_that_of_a_wall_askew_to_the_fan(slope):
     site = Site.of_tile(np.zeros(shape, dtype=bool), CELL, height)
     dut = FilmModel(site, tip=TIP, speed=SPEED, nominal=NOMINAL)
     line = dut.line(0.5, STANDOFF)
-    film = np.zeros(site.wanted.shape[1])
+    film = np.zeros(site.paintable.shape[1])
     film[slice(*line.columns)] = line.film[site.border + 20]
     film = film[site.border : -site.border]
     distance = STANDOFF - slope * x

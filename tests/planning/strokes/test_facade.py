@@ -15,13 +15,14 @@ from painter.planning.config import (
 )
 from painter.planning.film.deposition import mean_film, predicted_film
 from painter.planning.strokes.facade import plan_base_positions
-from painter.planning.strokes.stroke_lines import nominal_pitch
+from painter.planning.strokes.spray_settings import SpraySettings
 
 TIP, RASTER, TILE = TipConfig(), RasterConfig(), TileConfig()
+SPRAY = SpraySettings(TIP, RASTER)
 
 
-def stations_of(width, height):
-    return plan_base_positions(width, height, tile=TILE, tip=TIP, raster=RASTER)
+def base_positions_of(width, height):
+    return plan_base_positions(width, height, SPRAY, tile=TILE)
 
 
 def film_on(base_positions, x, y, *, shift=(0.0, 0.0)):
@@ -33,14 +34,14 @@ def film_on(base_positions, x, y, *, shift=(0.0, 0.0)):
             s.replace(start_T=s.start_T + off, end_T=s.end_T + off)
             for s in base_position.strokes_on_wall
         ]
-    pitch = nominal_pitch(x[-1] + x[0], tip=TIP, raster=RASTER)
+    pitch = SPRAY.nominal_pitch(x[-1] + x[0])
     nominal = mean_film(TIP, speed=RASTER.speed, pitch=pitch)
     return predicted_film(strokes, x, y, tip=TIP) / nominal
 
 
 @pytest.mark.parametrize("size", [(2.0, 2.0), (5.0, 2.0), (10.0, 6.0), (1.2, 3.1)])
 def test_stations_cover_the_wall_with_tiles_that_fit(size):
-    base_positions = stations_of(*size)
+    base_positions = base_positions_of(*size)
     for base_position in base_positions:
         assert base_position.width <= TILE.width + 1e-9
         assert base_position.height <= TILE.height + 1e-9
@@ -55,7 +56,7 @@ def test_stations_cover_the_wall_with_tiles_that_fit(size):
 
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.005, 0.0), (0.0, 0.005)])
 def test_film_across_joints_is_within_a_tenth_of_nominal(shift):
-    base_positions = stations_of(4.0, 3.6)  # Two by two, or more.
+    base_positions = base_positions_of(4.0, 3.6)  # Two by two, or more.
     assert len(base_positions) >= 4
     x = np.arange(0.005, 4.0, 0.01)
     y = np.arange(0.005, 3.6, 0.01)
@@ -69,9 +70,7 @@ DOOR = ZoneConfig(corners=[[3.0, 0.0], [4.0, 2.1]])
 
 
 def test_openings_stay_clean_and_their_surroundings_are_painted():
-    base_positions = plan_base_positions(
-        6.0, 3.6, tile=TILE, tip=TIP, raster=RASTER, zones=[DOOR]
-    )
+    base_positions = plan_base_positions(6.0, 3.6, SPRAY, tile=TILE, zones=[DOOR])
     x = np.arange(0.005, 6.0, 0.01)
     y = np.arange(0.005, 3.6, 0.01)
     film = film_on(base_positions, x, y)
@@ -82,8 +81,8 @@ def test_openings_stay_clean_and_their_surroundings_are_painted():
     assert film[225:-15, 15:-15].min() >= 0.9  # Over the door, too.
 
 
-def test_no_station_stands_before_an_opening_alone():
-    whole = stations_of(6.0, 2.0)
+def test_no_base_position_stands_before_an_opening_alone():
+    whole = base_positions_of(6.0, 2.0)
     # All that one base position would paint is a gate.
     gate = ZoneConfig(
         corners=[
@@ -91,23 +90,21 @@ def test_no_station_stands_before_an_opening_alone():
             [whole[1].left + whole[1].width, 2.0],
         ]
     )
-    dut = plan_base_positions(6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[gate])
+    dut = plan_base_positions(6.0, 2.0, SPRAY, tile=TILE, zones=[gate])
     assert [s.left for s in dut] == [s.left for s in whole if s is not whole[1]]
 
 
 def test_only_what_is_included_gets_strokes():
     zone = ZoneConfig(kind="include", corners=[[0.5, 0.5], [1.5, 1.5]])
-    (dut,) = plan_base_positions(
-        6.0, 2.0, tile=TILE, tip=TIP, raster=RASTER, zones=[zone]
-    )
+    (dut,) = plan_base_positions(6.0, 2.0, SPRAY, tile=TILE, zones=[zone])
     ends = np.array([[s.start_T, s.end_T] for s in dut.strokes_on_wall])
     assert ends[..., 0].min() > 0.45 and ends[..., 0].max() < 1.55
     assert ends[..., 1].min() == pytest.approx(0.5, abs=0.02)
     assert ends[..., 1].max() == pytest.approx(1.5, abs=0.02)
 
 
-def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):
-    base_position = stations_of(4.0, 3.6)[0]
+def test_a_base_position_is_a_program_that_the_arm_can_do(robot, make_wall):
+    base_position = base_positions_of(4.0, 3.6)[0]
     shift = np.array([(TILE.width - base_position.width) / 2.0, 0.0])
     strokes = [
         s.replace(start_T=s.start_T + shift, end_T=s.end_T + shift)
@@ -120,17 +117,15 @@ def test_a_station_is_a_program_that_the_arm_can_do(robot, make_wall):
     )
 
 
-def test_stations_have_one_coat():
+def test_base_positions_have_one_coat():
     raster = RasterConfig(coats=2)
     with pytest.raises(ValueError, match=r"raster\.coats must be 1 .* got 2"):
-        plan_base_positions(5.0, 2.0, tile=TileConfig(), tip=TipConfig(), raster=raster)
+        plan_base_positions(5.0, 2.0, SpraySettings(TIP, raster), tile=TILE)
 
 
 def test_a_tile_lower_than_two_overlaps_is_refused():
     with pytest.raises(ValueError, match="two overlaps"):
-        plan_base_positions(
-            4.0, 4.0, tile=TileConfig(height=0.3), tip=TIP, raster=RASTER
-        )
+        plan_base_positions(4.0, 4.0, SPRAY, tile=TileConfig(height=0.3))
 
 
 def reach_with(share):

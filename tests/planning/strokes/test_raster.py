@@ -6,7 +6,8 @@ import pytest
 from painter.planning.config import RasterConfig, TipConfig
 from painter.planning.film.deposition import best_pitch, mean_film, predicted_film
 from painter.planning.strokes.raster import plan_strokes
-from painter.planning.strokes.stroke_lines import nominal_pitch, place_lines, wall_share
+from painter.planning.strokes.spray_settings import SpraySettings
+from painter.planning.strokes.stroke_lines import place_lines, wall_share
 from painter.planning.tile import cell_centres
 
 CELL = 0.01
@@ -20,7 +21,7 @@ def raster(**changes):
 
 
 def wall(*keepouts, width=2.0, height=2.0):
-    """A wall with rectangles (x, y, width, height), m, that stay clean."""
+    """A wall with rectangles (x, y, width, height), m, of keep-out."""
     mask = np.ones((round(height / CELL), round(width / CELL)), dtype=bool)
     for x, y, w, h in keepouts:
         rows = slice(round(y / CELL), round((y + h) / CELL))
@@ -29,7 +30,7 @@ def wall(*keepouts, width=2.0, height=2.0):
 
 
 def plan(mask, **changes):
-    return plan_strokes(mask, CELL, tip=TIP, raster=raster(**changes))
+    return plan_strokes(mask, CELL, SpraySettings(TIP, raster(**changes)))
 
 
 def columns(strokes):
@@ -50,15 +51,15 @@ def pair(mask, strokes, setting):
     x, y = cell_centres(mask.shape, CELL, margin=margin)
     film = predicted_film(strokes, x, y, tip=TIP)
     width = (mask.shape[1] - 2 * border) * CELL
-    pitch = nominal_pitch(width, tip=TIP, raster=setting)
+    pitch = SpraySettings(TIP, setting).nominal_pitch(width)
     nominal = mean_film(TIP, speed=setting.speed, pitch=pitch)
     return np.mean(film[mask] >= 0.8 * nominal), 1.0 - film[mask].sum() / film.sum()
 
 
 def test_pitch_fills_the_width_with_no_strip_left_over():
-    pitch = nominal_pitch(2.0, tip=TIP, raster=raster())
+    pitch = SpraySettings(TIP, raster()).nominal_pitch(2.0)
     assert pitch == pytest.approx(2.0 / 14)  # 2 / 0.1431 = 13.98 lines.
-    assert nominal_pitch(2.0, tip=TIP, raster=raster(overlap_pitch=0.1)) == 0.1
+    assert SpraySettings(TIP, raster(overlap_pitch=0.1)).nominal_pitch(2.0) == 0.1
 
 
 def test_share_is_one_on_wall_and_half_at_its_edge():
@@ -144,14 +145,14 @@ def test_strokes_shorter_than_the_shortest_are_dropped():
 def test_lines_move_to_the_edges_of_a_narrow_door_frame():
     """Wall of 0.3 m between a door and a window wants two lines, symmetric in it."""
     mask = wall((0.2, 0.0, 0.9, 2.0), (1.4, 0.0, 0.6, 2.0))
-    lines = place_lines(mask, CELL, tip=TIP, raster=raster())
+    lines = place_lines(mask, CELL, SpraySettings(TIP, raster()))
     own = lines[(lines > 1.1) & (lines < 1.4)]
     assert own.size == 2
     assert own.mean() == pytest.approx(1.25, abs=0.005)
 
 
 def test_a_tile_narrower_than_the_fan_gets_one_line_in_its_middle():
-    lines = place_lines(wall(width=0.13), CELL, tip=TIP, raster=raster())
+    lines = place_lines(wall(width=0.13), CELL, SpraySettings(TIP, raster()))
     assert lines.tolist() == pytest.approx([0.065], abs=0.002)
 
 
