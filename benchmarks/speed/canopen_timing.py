@@ -103,7 +103,7 @@ def lateness_of(log: Path) -> tuple[float, ...]:
     Beside the period's grid that hardly any SYNC is earlier than, without the first
     second.
     """
-    times = [r.time for r in read_log(log).records if r.frame.cob_id == SYNC_ID]
+    times = [r.time for r in read_log(log) if r.frame.cob_id == SYNC_ID]
     sent = np.array(times) - times[0]
     sent = sent[sent > 1.0]
     # Up to three quarters of a period may be told as late, beside what is usual.

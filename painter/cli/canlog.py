@@ -112,7 +112,7 @@ def _replay(log: Path, bus: BusConfig, folder: Path) -> dict[str, object]:
     from painter.run.folder.values import Executed
 
     try:
-        played = LogBus(bus, read_log(log).records)
+        played = LogBus(bus, read_log(log))
     except InputError as error:
         raise InputError(
             f"{log}: {str(error).removeprefix(f'{log}: ')}", code="PNT-USE-008"

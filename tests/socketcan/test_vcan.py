@@ -126,7 +126,7 @@ def test_bus_off_stops_the_arm_and_an_acknowledgement_starts_it(enabled, tmp_pat
     move(enabled, np.full(5, 0.05))
 
     def errors():
-        records = read_log(tmp_path / "bus.log").records
+        records = read_log(tmp_path / "bus.log")
         return [record.frame.cob_id for record in records if record.frame.is_error]
 
     wait_for(errors, "no error frame in the log")
@@ -205,7 +205,7 @@ def test_logs_of_candump_itself_are_read(tmp_path):
         peer.terminate()
         peer.wait()
         transport.close()
-    frames = [record.frame for record in read_log(log).records]
+    frames = [record.frame for record in read_log(log)]
     assert frames[-3:] == [*sent, Frame(ERROR_BUS_OFF, bytes(8), is_error=True)]
 
 

@@ -1,10 +1,11 @@
-"""Logs of a bus in candump's format: one frame a line, as `candump -L` writes them.
+"""Bus logs in candump's format: one frame a line, as `candump -L` writes them.
 
     (1436509052.249713) can0 185#2712A0860100 R
 
 Source: can-utils, lib.c (sprint_canframe) and canlogserver's manual: three digits of an
 11-bit identifier, eight of a 29-bit one or, with flag 20000000h, of an error frame;
-`#R` marks a remote frame, `##` CAN FD; a trailing T or R says sent or received.
+`#R` marks a remote frame, `##` CAN FD; a trailing T or R means sent or received.
+docs/decisions/candump.md says why python-can's reader and writer are not used.
 """
 
 import re
@@ -29,10 +30,10 @@ class LogRecord:
     """One line of a log.
 
     Attributes:
-        time: When the frame passed, s; in logs from the bus process since 1970 (UTC).
+        time: Time stamp of the frame, s; in logs of the bus process since 1970 (UTC).
         frame: The frame.
-        is_sent: True if the master sent it, False if it came, None if the log does not
-            say.
+        is_sent: True if the master sent it, False if the master received it, None if
+            the log does not say.
     """
 
     time: float
@@ -40,21 +41,8 @@ class LogRecord:
     is_sent: bool | None = None
 
 
-@dataclass(frozen=True)
-class BusLog:
-    """A whole log.
-
-    Attributes:
-        records: Frames of CANopen's kind and error frames, as they stand in the file.
-        foreign: How many lines held extended, remote or CAN FD frames, left out.
-    """
-
-    records: list[LogRecord]
-    foreign: int = 0
-
-
 def format_record(record: LogRecord, channel: str) -> str:
-    """Returns a record as a line without its end."""
+    """Returns a record as a line, without the line break."""
     frame = record.frame
     if frame.is_error:
         cob_id = f"{_ERROR_FLAG | frame.cob_id:08X}"
@@ -66,10 +54,10 @@ def format_record(record: LogRecord, channel: str) -> str:
 
 
 def parse_line(line: str) -> LogRecord | None:
-    """Reads a line; None for a frame that is not of CANopen's kind.
+    """Reads a line; None for an extended, remote or CAN FD frame.
 
     Raises:
-        ValueError: It is no line of a log.
+        ValueError: The line is not in candump's format.
     """
     match = _LINE.fullmatch(line)
     if match is None:
@@ -90,12 +78,13 @@ def parse_line(line: str) -> LogRecord | None:
 
 
 def read_lines(path: Path) -> Iterator[LogRecord | None]:
-    """Reads a log line by line; None for a frame that is not of CANopen's kind.
+    """Reads a log line by line; None for an extended, remote or CAN FD frame.
 
-    A last line without its end is left out: who wrote it was stopped amid the line.
+    Skips a last line without a line break: its writer was killed while writing it.
 
     Raises:
-        InputError: The file cannot be read, or a line is none of a log; names both.
+        InputError: The file cannot be read, or a line is not in candump's format; names
+            file and line.
     """
     try:
         with path.open(encoding="ascii") as lines:
@@ -120,14 +109,13 @@ def read_lines(path: Path) -> Iterator[LogRecord | None]:
         raise InputError(f"{path}: {error.strerror}.", code="PNT-BUS-028") from error
 
 
-def read_log(path: Path) -> BusLog:
-    """Reads a whole log.
+def read_log(path: Path) -> list[LogRecord]:
+    """Reads a whole log: CANopen and error frames in the order of the file.
 
     Raises:
-        InputError: As `read_lines`, or it holds no frames.
+        InputError: As `read_lines`, or the log holds no CANopen frames.
     """
-    found = list(read_lines(path))
-    records = [record for record in found if record is not None]
+    records = [record for record in read_lines(path) if record is not None]
     if not records:
         raise InputError(f"{path}: holds no CANopen frames.", code="PNT-BUS-029")
-    return BusLog(records, len(found) - len(records))
+    return records

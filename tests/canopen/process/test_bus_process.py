@@ -180,7 +180,7 @@ def test_drives_stop_and_the_log_is_whole_when_the_bus_process_is_killed(
     with pytest.raises(BusError, match="has ended"):
         dut.report()
     dut.close()
-    frames = [record.frame for record in read_log(log).records]
+    frames = [record.frame for record in read_log(log)]
     enable = b"\x0f\0"  # Controlword of all five RPDOs.
     enabled = {f.cob_id for f in frames if f.data[:2] == enable and f.cob_id < 0x300}
     assert enabled >= {0x201, 0x202, 0x203, 0x204, 0x205}

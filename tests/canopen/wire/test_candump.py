@@ -89,7 +89,7 @@ def test_unusable_files_are_named(tmp_path):
 def test_a_line_that_was_cut_off_is_left_out(tmp_path):
     path = tmp_path / "cut.log"
     path.write_text("(1.0) can0 080#\n(2.0) can0 185#00112")
-    assert [record.time for record in read_log(path).records] == [1.0]
+    assert [record.time for record in read_log(path)] == [1.0]
 
 
 def test_python_can_reads_what_we_write_and_the_other_way(tmp_path):
@@ -113,5 +113,5 @@ def test_python_can_reads_what_we_write_and_the_other_way(tmp_path):
     with can.CanutilsLogWriter(theirs) as writer:
         for message in messages[:2]:
             writer.on_message_received(message)
-    found = read_log(theirs).records
+    found = read_log(theirs)
     assert [record.frame for record in found] == [r.frame for r in records[:2]]

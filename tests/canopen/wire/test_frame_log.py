@@ -45,7 +45,7 @@ def test_frames_of_both_ways_are_written_in_order(tmp_path):
     dut.receive(0.001)
     dut.close()
     logger.close()
-    records = read_log(path).records
+    records = read_log(path)
     assert len(records) == 1002
     assert [record.is_sent for record in records] == [True, False] * 501
     for i in range(500):
