@@ -18,9 +18,9 @@ from painter.canopen.protocol.cia402 import (
 )
 from painter.canopen.protocol.codes import SDO_ABORTS
 from painter.canopen.protocol.frames import Frame
+from painter.canopen.protocol.nmt import NmtState
 from painter.canopen.protocol.od_types import DataType
 from painter.canopen.sim.drive import SimDrive
-from painter.canopen.sim.node import Nmt
 from painter.canopen.sim.store import LOAD, SAVE
 from painter.canopen.sim.wire import Wire
 
@@ -406,14 +406,14 @@ def test_segments_alternate_their_toggle_bit(bench):
 
 def test_nmt_states_decide_what_is_answered(bench):
     # CiA 301, table 38 (NMT states and communication objects).
-    assert bench.dut.nmt == Nmt.PRE_OPERATIONAL
+    assert bench.dut.nmt == NmtState.PRE_OPERATIONAL
     bench.send(0, [2, 5])
-    assert bench.dut.nmt == Nmt.STOPPED
+    assert bench.dut.nmt == NmtState.STOPPED
     assert bench.sdo(bytes([0x40, 0, 0x10, 0, 0, 0, 0, 0])) is None
     bench.send(0, [1, 0])
-    assert bench.dut.nmt == Nmt.OPERATIONAL
+    assert bench.dut.nmt == NmtState.OPERATIONAL
     bench.send(0, [128, 6])  # Another node's.
-    assert bench.dut.nmt == Nmt.OPERATIONAL
+    assert bench.dut.nmt == NmtState.OPERATIONAL
     bench.frames.clear()
     bench.send(0, [129, 5])
     bench.run(0.1)

@@ -1,4 +1,4 @@
-"""Logs of the bus in words and figures.
+"""Bus logs decoded, summed up and replayed.
 
-Reads what was recorded; never sends.
+Reads recordings; never sends.
 """

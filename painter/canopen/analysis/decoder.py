@@ -1,4 +1,4 @@
-"""Frames of a log in words: NMT, SYNC, EMCY, PDOs, SDOs, heartbeats, error frames.
+"""Decodes frames of a log: NMT, SYNC, EMCY, PDOs, SDOs, heartbeats, error frames.
 
 Source: CiA 301 v4.2.0, 7.2 (services) and 7.3.5 (pre-defined connection set); Linux,
 include/uapi/linux/can/error.h (error frames).
@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from painter.canopen.analysis.object_names import object_text
 from painter.canopen.analysis.value_text import ValueFormatter
 from painter.canopen.config.bus_config import BusConfig
-from painter.canopen.config.units import AXES
+from painter.canopen.master.arm_nodes import ArmNodes
 from painter.canopen.master.drive_client import DriveClient
-from painter.canopen.master.io_client import IoClient
-from painter.canopen.master.node_client import NodeClient
 from painter.canopen.protocol.codes import abort_text, emcy_text
 from painter.canopen.protocol.frames import (
     EMCY_BASE,
@@ -24,16 +22,23 @@ from painter.canopen.protocol.frames import (
     SYNC_ID,
     Frame,
 )
+from painter.canopen.protocol.nmt import NmtCommand, NmtState
 from painter.canopen.protocol.pdo_maps import PdoMaps
+from painter.canopen.protocol.sdo import address_of, expedited_data, segment_data
 
-_NMT_COMMANDS = {
-    1: "start",
-    2: "stop",
-    128: "enter pre-operational",
-    129: "reset node",
-    130: "reset communication",
+_NMT_COMMANDS: dict[int, str] = {
+    NmtCommand.START: "start",
+    NmtCommand.STOP: "stop",
+    NmtCommand.ENTER_PRE_OPERATIONAL: "enter pre-operational",
+    NmtCommand.RESET_NODE: "reset node",
+    NmtCommand.RESET_COMMUNICATION: "reset communication",
 }
-_NMT_STATES = {0: "boot-up", 4: "STOPPED", 5: "OPERATIONAL", 127: "PRE-OPERATIONAL"}
+_NMT_STATES: dict[int, str] = {
+    NmtState.INITIALISING: "boot-up",
+    NmtState.STOPPED: "STOPPED",
+    NmtState.OPERATIONAL: "OPERATIONAL",
+    NmtState.PRE_OPERATIONAL: "PRE-OPERATIONAL",
+}
 _ERRORS = {
     0x01: "transmission timed out",
     0x02: "arbitration lost",
@@ -45,12 +50,12 @@ _ERRORS = {
     0x80: "bus error",
     0x100: "controller restarted",
 }
-# Objects that a change of is news; positions change always.
+# Objects whose changes are news; positions always change.
 _NEWS = frozenset({0x6000, 0x6040, 0x6041, 0x6060, 0x6061, 0x6200})
 
 
 class Kind(enum.StrEnum):
-    """Sorts of frames."""
+    """Kinds of frames."""
 
     NMT = "nmt"
     SYNC = "sync"
@@ -65,14 +70,14 @@ class Kind(enum.StrEnum):
 
 @dataclass(frozen=True)
 class Decoded:
-    """A frame in words.
+    """A decoded frame.
 
     Attributes:
-        kind: Its sort.
-        node: Name of the node that it comes from or goes to; empty for all.
-        text: What it says.
-        is_news: Whether it says more than that all goes on as before: commands, states
-            that changed, answers to SDO requests, emergencies, errors.
+        kind: Its kind.
+        node: Name of the node that sends or receives it; empty for all nodes.
+        text: Its content.
+        is_news: Whether it is a command, a changed state, an answer to an SDO request,
+            an emergency or an error; not repeated process data.
     """
 
     kind: Kind
@@ -82,19 +87,15 @@ class Decoded:
 
 
 class Decoder:
-    """Decodes frames in the order of a log, whose SDO writes may change PDO maps."""
+    """Decodes frames in the order of a log; its SDO writes may change PDO maps."""
 
     def __init__(self, bus: BusConfig) -> None:
-        """Knows the nodes of a bus file, mapped as the master maps them.
+        """Starts with the nodes of a bus file and the PDO maps that the master writes.
 
         Raises:
-            InputError: A drive's EDS does not allow its configuration.
+            InputError: The EDS of a drive does not allow its configuration.
         """
-        clients: list[NodeClient] = [
-            DriveClient(axis, bus, limits, _send_nothing)
-            for axis, limits in zip(AXES, bus.drive_limits(), strict=True)
-        ]
-        clients.append(IoClient(bus, _send_nothing))
+        clients = ArmNodes(bus, lambda frame: None).all
         self._names = {client.node_id: client.name for client in clients}
         self._names[bus.master_id] = "master"
         self._words = {
@@ -107,17 +108,17 @@ class Decoder:
         for client in clients:
             for entry in client.plan.entries:
                 self._write(client.node_id, entry.index, entry.sub, entry.value)
-        # Last value of objects that are news when they change; NMT states at index 0.
+        # Last values of the objects whose changes are news; NMT states at index 0.
         self._last: dict[tuple[int, int], int] = {}
         self._requests: dict[int, tuple[int, int, bytes]] = {}
 
     @property
     def node_names(self) -> list[str]:
-        """Names that frames are shown with."""
+        """Names of the nodes in decoded frames."""
         return list(self._names.values())
 
     def decode(self, frame: Frame) -> Decoded:
-        """Returns a frame in words."""
+        """Returns a decoded frame."""
         cob_id, data = frame.cob_id, frame.data
         if frame.is_error:
             return Decoded(Kind.ERROR, "", _error_text(cob_id))
@@ -170,14 +171,14 @@ class Decoder:
 
     def _request(self, node_id: int, data: bytes) -> Decoded:
         name, command = self._name(node_id), data[0] >> 5
-        index, sub = int.from_bytes(data[1:3], "little"), data[3]
+        index, sub = address_of(data)
         if command == 4:
             code = int.from_bytes(data[4:], "little")
-            text = f"{object_text(index, sub)}: given up, {_abort(code)}"
+            text = f"{object_text(index, sub)}: aborted by the master, {_abort(code)}"
             return Decoded(Kind.SDO, name, text)
         if command not in (1, 2):
             return Decoded(Kind.SDO, name, "segment", is_news=False)
-        payload = _expedited(data) if command == 1 else b""
+        payload = expedited_data(data) if command == 1 else b""
         self._requests[node_id] = (index, sub, payload)
         verb = "write" if command == 1 else "read"
         text = f"{verb} {object_text(index, sub)}"
@@ -185,7 +186,7 @@ class Decoder:
 
     def _answer(self, node_id: int, data: bytes) -> Decoded:
         name, command = self._name(node_id), data[0] >> 5
-        index, sub = int.from_bytes(data[1:3], "little"), data[3]
+        index, sub = address_of(data)
         if command == 4:
             code = int.from_bytes(data[4:], "little")
             text = f"{object_text(index, sub)}: aborted, {_abort(code)}"
@@ -199,15 +200,14 @@ class Decoder:
             self._write(node_id, index, sub, value)
             return Decoded(Kind.SDO, name, f"{object_text(index, sub)} := {shown}")
         if command == 2 and data[0] & 0x02:
-            shown = self._shown(node_id, index, sub, _expedited(data))
+            shown = self._shown(node_id, index, sub, expedited_data(data))
             return Decoded(Kind.SDO, name, f"{object_text(index, sub)} = {shown}")
         if command == 2:
             length = int.from_bytes(data[4:], "little")
             text = f"{object_text(index, sub)}: {length} bytes follow"
             return Decoded(Kind.SDO, name, text)
         if command == 0:
-            part = data[1 : 8 - (data[0] >> 1 & 7)]
-            return Decoded(Kind.SDO, name, f"segment {part!r}")
+            return Decoded(Kind.SDO, name, f"segment {segment_data(data)!r}")
         return Decoded(Kind.SDO, name, "segment", is_news=False)
 
     def _write(self, node_id: int, index: int, sub: int, value: int) -> None:
@@ -227,16 +227,6 @@ class Decoder:
 
     def _name(self, node_id: int) -> str:
         return self._names.get(node_id, f"node {node_id}")
-
-
-def _send_nothing(frame: Frame) -> None:
-    """Clients that only listen send nothing."""
-
-
-def _expedited(data: bytes) -> bytes:
-    """Data bytes of an expedited transfer."""
-    size = 4 - (data[0] >> 2 & 3) if data[0] & 0x01 else 4
-    return data[4 : 4 + size]
 
 
 def _abort(code: int) -> str:

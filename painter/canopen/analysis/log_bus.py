@@ -1,6 +1,6 @@
-"""A recorded log in the bus's place: what a diagram reads is what the arm did then.
+"""Plays a recorded log in place of the bus: a diagram reads what the arm did.
 
-The frames go through the same clients as on the robot. Times are the log's.
+The frames pass through the same clients as on the robot. Times are the log's.
 """
 
 from collections.abc import Sequence
@@ -9,32 +9,31 @@ import numpy as np
 
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.units import AXES, joints_from_axes
+from painter.canopen.master.arm_nodes import ArmNodes
 from painter.canopen.master.drive_client import DriveClient
 from painter.canopen.master.feedback import BusState, Feedback, Statistics
-from painter.canopen.master.io_client import IoClient
 from painter.canopen.master.node_client import NodeClient
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.process.bus_process import Report
 from painter.canopen.process.sample_ring import Samples
 from painter.canopen.protocol.cia402 import Command, State, command_of
-from painter.canopen.protocol.frames import ERROR_BUS_OFF, RPDO_BASES, SYNC_ID, Frame
+from painter.canopen.protocol.frames import ERROR_BUS_OFF, RPDO_BASES, SYNC_ID
 from painter.canopen.wire.candump import LogRecord
 from painter.errors import InputError
-from perception.ground import FloatArray
 
 
 class LogBus:
     """A bus that plays a log; commands to it have no effect."""
 
     def __init__(self, bus: BusConfig, records: Sequence[LogRecord]) -> None:
-        """Reads the log through; the clock stands where all drives were first enabled.
+        """Reads the whole log; the clock starts where all drives are first enabled.
 
         Args:
-            bus: What was on the bus.
+            bus: The bus file.
             records: The log.
 
         Raises:
-            InputError: The drives are never all enabled in it.
+            InputError: At no time in the log are all drives enabled.
         """
         listener = _Listener(bus)
         for record in records:
@@ -44,28 +43,28 @@ class LogBus:
         enabled = [f.time for f in self._feedbacks if f.bus_state == BusState.ENABLED]
         if not enabled:
             raise InputError(
-                "the log holds no time at which all drives are enabled.",
+                "at no time in the log are all drives enabled.",
                 code="PNT-BUSLOG-001",
             )
         self.begin, self.end = enabled[0], float(self._times[-1])
         self._now = self.begin
 
     def start(self) -> None:
-        """Bring-up is in the log."""
+        """Does nothing: bring-up is in the log."""
 
     def push(self, points: list[Setpoint]) -> None:
-        """What was commanded is in the log."""
+        """Does nothing: commands are in the log."""
 
     def stop(self, reason: str) -> None:
-        """What stopped the arm is in the log."""
+        """Does nothing: stops are in the log."""
 
     def report(self) -> Report:
-        """Returns what the bus knew at its present."""
+        """Returns the report at the present time of the log."""
         after = int(np.searchsorted(self._times, self._now, side="right"))
         return Report(self._feedbacks[max(0, after - 1)])
 
     def samples(self, since: float) -> Samples:
-        """Returns what was measured after a time and up to now, s."""
+        """Returns samples after a time, s, up to now."""
         first, end = np.searchsorted(self._times, (since, self._now), side="right")
         rows = self._feedbacks[first:end]
         return Samples(
@@ -76,11 +75,11 @@ class LogBus:
         )
 
     def now(self) -> float:
-        """Returns the log's present, s."""
+        """Returns the present time of the log, s."""
         return self._now
 
     def wait_until(self, when: float) -> None:
-        """Makes a time, s, the present."""
+        """Advances the present time to `when`, s."""
         self._now = max(self._now, when)
 
     def close(self) -> None:
@@ -88,27 +87,18 @@ class LogBus:
 
 
 class _Listener:
-    """Takes the frames of a log and notes the arm's state at each SYNC."""
+    """Takes the frames of a log and records the arm's state at each SYNC."""
 
     def __init__(self, bus: BusConfig) -> None:
-        def send(frame: Frame) -> None:
-            """Clients that only listen send nothing."""
-
         self.feedbacks: list[Feedback] = []
-        self._drives = [
-            DriveClient(axis, bus, limits, send)
-            for axis, limits in zip(AXES, bus.drive_limits(), strict=True)
-        ]
-        self._io = IoClient(bus, send)
-        nodes: list[NodeClient] = [*self._drives, self._io]
-        self._by_id = {node.node_id: node for node in nodes}
-        self._nodes = nodes
+        self._nodes = ArmNodes(bus, lambda frame: None)
+        self._drives, self._io = self._nodes.drives, self._nodes.io
         self._valve = 1 << bus.io.valve_bit
         self._full_flow = bus.io.flow_full_scale
         self._state, self._reason, self._stopped_at = BusState.STARTING, "", 0.0
-        # Drives go on saying that they are enabled for a cycle after a stop.
+        # After a stop, drives report OPERATION ENABLED for one more cycle.
         self._has_left = True
-        # What the drives answer to a SYNC was measured at it.
+        # Drives answer a SYNC with what they measured at it.
         self._last_sync: float | None = None
 
     def take(self, record: LogRecord) -> None:
@@ -122,7 +112,7 @@ class _Listener:
                 self._note(self._last_sync)
             self._last_sync = now
             return
-        node = self._by_id.get(frame.cob_id & 0x7F)
+        node = self._nodes.find(frame.cob_id)
         if node is None:
             return
         if frame.cob_id == RPDO_BASES[0] + node.node_id:
@@ -150,17 +140,16 @@ class _Listener:
 
     def _note(self, time: float) -> None:
         self._watch(time)
-        axes = [d.units.angle(d.position) for d in self._drives]
-        speeds = [d.units.speed(d.velocity) for d in self._drives]
-        targets = [d.units.angle(d.target) for d in self._drives]
+        q, v = self._nodes.joint_state()
+        targets = np.array([d.units.angle(d.target) for d in self._drives])
         feedback = Feedback(
             time=time,
             bus_state=self._state,
             reason=self._reason,
             stopped_at=self._stopped_at,
-            q=_joints(axes),
-            v=_joints(speeds),
-            q_commanded=_joints(targets),
+            q=q,
+            v=v,
+            q_commanded=joints_from_axes(targets),
             trigger=self._io.trigger,
             axes=tuple(drive.status() for drive in self._drives),
             is_chain_closed=self._io.is_chain_closed,
@@ -168,30 +157,26 @@ class _Listener:
             buffered=0,
             statistics=Statistics(cycles=len(self.feedbacks) + 1),
         )
-        # Error frames and slow clocks of loggers may put a SYNC before the last one.
+        # Clocks of loggers may step back, so that a SYNC is before the last one.
         if not self.feedbacks or time > self.feedbacks[-1].time:
             self.feedbacks.append(feedback)
 
     def _watch(self, now: float) -> None:
-        """Derives the bus state from what the drives say and are told."""
+        """Derives the bus state from statuswords and controlwords."""
         is_enabled = all(drive.state == State.ENABLED for drive in self._drives)
-        is_told = all(
+        is_commanded = all(
             command_of(d.controlword) == Command.ENABLE_OPERATION for d in self._drives
         )
         if self._state != BusState.ENABLED:
-            self._has_left |= not (is_enabled and is_told)
-            if is_enabled and is_told and self._has_left:
+            self._has_left |= not (is_enabled and is_commanded)
+            if is_enabled and is_commanded and self._has_left:
                 self._state, self._reason, self._stopped_at = BusState.ENABLED, "", 0.0
             return
-        complaints = [d.stop_reason(must_be_enabled=True) for d in self._drives]
-        if not is_told:
-            complaints.append("the master stopped the arm.")
+        reasons = [d.stop_reason() for d in self._drives]
+        if not is_commanded:
+            reasons.append("the master stopped the arm.")
         if self._io.inputs is not None:
-            complaints.insert(0, self._io.stop_reason())
-        found = next((text for text in complaints if text), None)
+            reasons.insert(0, self._io.stop_reason())
+        found = next((reason for reason in reasons if reason), None)
         if found is not None:
             self._stop(found, now)
-
-
-def _joints(axes: list[float]) -> FloatArray:
-    return joints_from_axes(np.array(axes))

@@ -1,4 +1,4 @@
-"""Figures of a log: frames, bus load, how even SYNC was, what went wrong."""
+"""Figures of a log: frames, bus load, SYNC jitter, errors."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from painter.canopen.wire.candump import LogRecord
 
 
 class LogSummary:
-    """Counts what passes."""
+    """Counts the frames of a log."""
 
     def __init__(self, bitrate: int) -> None:
-        """Begins with nothing.
+        """Creates an empty summary.
 
         Args:
             bitrate: Bits a second, for the bus load.
@@ -49,11 +49,11 @@ class LogSummary:
             self._events.append(_event(record, decoded))
 
     def figures(self) -> dict[str, object]:
-        """Returns the figures; times in s, shares of 1."""
+        """Returns the figures; times in s, shares 0 to 1."""
         start = self._first or 0.0
         duration = self._last - start
         total = sum(self._busy.values()) * 1e-9
-        # The last second is a part of one.
+        # The last second is incomplete.
         whole = [busy for second, busy in self._busy.items() if second + 1 <= duration]
         return {
             "frames": sum(self._kinds.values()),

@@ -1,8 +1,8 @@
-"""Names of objects as a log shows them.
+"""Names of objects in decoded logs.
 
 Source: CiA 301 v4.2.0, 7.5.2 (1000h to 1FFFh); CiA 402-2 v4.0.0 (603Fh to 67FFh);
-CiA 401-1 v3.1.0 (6000h to 6444h). What CiA 401 and 402 both define stands for 402,
-except the indices below that only an I/O node uses.
+CiA 401-1 v3.1.0 (6000h to 6444h). Indices that both define have the name of CiA 402,
+except those that only an I/O node uses.
 """
 
 _NAMES = {
@@ -44,8 +44,8 @@ _NAMES = {
     0x607A: "target",
     0x607C: "home offset",
     0x607D: "software position limit",
-    0x607F: "greatest profile velocity",
-    0x6080: "greatest motor speed",
+    0x607F: "max profile velocity",
+    0x6080: "max motor speed",
     0x6081: "profile velocity",
     0x6083: "profile acceleration",
     0x6084: "profile deceleration",
@@ -58,7 +58,7 @@ _NAMES = {
     0x60A9: "velocity unit",
     0x60C1: "interpolation target",
     0x60C2: "interpolation period",
-    0x60C5: "greatest acceleration",
+    0x60C5: "max acceleration",
     0x60F4: "following error",
     0x6200: "digital outputs",
     0x6206: "output error mode",
@@ -94,5 +94,5 @@ def object_text(index: int, sub: int) -> str:
 
 
 def object_value(index: int, data: bytes) -> int:
-    """Returns the number that an object's bytes mean."""
+    """Returns the integer value of an object's bytes."""
     return int.from_bytes(data, "little", signed=index in _SIGNED)

@@ -1,4 +1,4 @@
-"""Values of objects in the words of CiA 301, 401 and 402, as a log shows them."""
+"""Values of objects as text in the terms of CiA 301, 401 and 402."""
 
 from painter.canopen.analysis.object_names import object_text, object_value
 from painter.canopen.config.bus_config import BusConfig
@@ -12,7 +12,8 @@ from painter.canopen.protocol.cia402 import (
     state_of,
 )
 
-# Bits 4 of the controlword, 12 and 13 of the statusword, which the mode gives a sense.
+# Bit 4 of the controlword, bits 12 and 13 of the statusword: their sense depends on the
+# mode.
 # Source: CiA 402-2 v4.0.0, "use of controlword and statusword" of each mode.
 _CONTROL_4: dict[int | None, str] = {
     Mode.PROFILE_POSITION: "new set-point",
@@ -35,11 +36,11 @@ _MAPPINGS = frozenset({*range(0x1600, 0x1800), *range(0x1A00, 0x1C00)})
 
 
 def controlword_text(word: int, mode: int | None = None) -> str:
-    """Returns a controlword as its command and the bits beside it.
+    """Returns a controlword as its command and other bits.
 
     Args:
         word: Value of 6040h.
-        mode: Value of 6060h, as far as known.
+        mode: Value of 6060h; None if unknown.
     """
     command = command_of(word)
     parts = ["no command" if command is None else command.name.replace("_", " ")]
@@ -51,11 +52,11 @@ def controlword_text(word: int, mode: int | None = None) -> str:
 
 
 def statusword_text(word: int, mode: int | None = None) -> str:
-    """Returns a statusword as its state and the flags beside it.
+    """Returns a statusword as its state and flags.
 
     Args:
         word: Value of 6041h.
-        mode: Value of 6060h, as far as known.
+        mode: Value of 6060h; None if unknown.
     """
     state = state_of(word)
     parts = ["no known state" if state is None else state.value]
@@ -75,10 +76,14 @@ def mode_text(mode: int) -> str:
 
 
 class ValueFormatter:
-    """Values of the objects of one node."""
+    """Formats values of the objects of one node.
+
+    Attributes:
+        mode: Value of 6060h; None if unknown.
+    """
 
     def __init__(self, bus: BusConfig, units: AxisUnits | None) -> None:
-        """Knows a node.
+        """Creates the formatter of a node.
 
         Args:
             bus: The bus file.
@@ -89,7 +94,7 @@ class ValueFormatter:
         self.mode: int | None = None
 
     def text(self, index: int, sub: int, data: bytes) -> str:
-        """Returns a value in words."""
+        """Returns the value of an object as text."""
         value = object_value(index, data)
         if index == 0x6040:
             return f"{value:04X}h {controlword_text(value, self.mode)}"

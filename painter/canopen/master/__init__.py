@@ -1,4 +1,4 @@
-"""The master: clients of drives and I/O, setpoints, what stops the arm.
+"""The master: clients of drives and I/O, setpoints, monitors that stop the arm.
 
-`arm_bus.py` is the whole. No thread, no clock: it is stepped.
+`arm_bus.py` is the entry point. It has no thread and no clock: callers step it.
 """

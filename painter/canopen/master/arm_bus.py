@@ -1,27 +1,19 @@
 """The master: one object that owns the bus; no thread, no clock of its own.
 
-`cycle` is called once a cycle with its due time, `poll` as often as wished in between;
-cyclic_loop.py does that in real time, tests in simulated time. Whatever goes wrong
-stops all axes, closes the gun and latches the reason until `acknowledge`.
+Call `cycle` once a cycle with its due time, and `poll` as often as needed in between:
+`process/bus_process.py` does so in real time, tests in simulated time. Any fault stops
+all axes, closes the gun and latches the reason until `acknowledge`.
 """
 
 import logging
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from painter.canopen.config.bus_config import BusConfig
-from painter.canopen.config.units import AXES, axes_from_joints, joints_from_axes
-from painter.canopen.master.drive_client import DriveClient
+from painter.canopen.config.units import axes_from_joints
+from painter.canopen.master.arm_nodes import ArmNodes
 from painter.canopen.master.feedback import BusState, Feedback, Statistics
 from painter.canopen.master.follower import SetpointFollower
-from painter.canopen.master.io_client import IoClient
-from painter.canopen.master.node_client import (
-    OPERATIONAL,
-    NodeClient,
-    Script,
-    run_concurrently,
-)
+from painter.canopen.master.node_client import NodeClient, Script, run_concurrently
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.master.watch import LoadMeter, first_stop_reason
 from painter.canopen.protocol.cia402 import Command
@@ -32,6 +24,7 @@ from painter.canopen.protocol.frames import (
     Frame,
     frame_time,
 )
+from painter.canopen.protocol.nmt import NmtState
 from painter.canopen.wire.transports import CanTransport, TransportError
 from painter.errors import BusError
 from perception.ground import FloatArray
@@ -41,28 +34,33 @@ _REOPEN_EVERY = 0.25
 
 
 class ArmBus:
-    """Brings nodes up, streams setpoints, watches, stops."""
+    """Brings nodes up, streams setpoints, monitors the nodes, stops the arm.
+
+    Attributes:
+        state: What the bus does.
+        reason: Why the arm was stopped; empty if it was not.
+        is_lost: Whether the transport has failed.
+        drives: Clients of the drives.
+        io: Client of the I/O node.
+        before_sync: Called right before each SYNC.
+        measured: Called when all drives have answered a SYNC, with its due time, s, q
+            (5,) rad, v (5,) rad/s and trigger.
+    """
 
     def __init__(self, bus: BusConfig, transport: CanTransport) -> None:
         """Creates the master; nothing is sent yet.
 
         Args:
-            bus: What is on the bus.
-            transport: The way to it.
+            bus: The bus file.
+            transport: Carries the frames.
 
         Raises:
-            InputError: A drive's EDS does not allow its configuration.
+            InputError: The EDS of a drive does not allow its configuration.
         """
         self._bus = bus
         self._transport = transport
-        limits = bus.drive_limits()
-        self.drives = [
-            DriveClient(axis, bus, limit, self._send)
-            for axis, limit in zip(AXES, limits, strict=True)
-        ]
-        self.io = IoClient(bus, self._send)
-        self.nodes: list[NodeClient] = [*self.drives, self.io]
-        self._by_id = {node.node_id: node for node in self.nodes}
+        self._nodes = ArmNodes(bus, self._send)
+        self.drives, self.io = self._nodes.drives, self._nodes.io
         self._follower = SetpointFollower(
             bus.joint_limits(),
             cycle=bus.cycle,
@@ -72,15 +70,13 @@ class ArmBus:
         self.state = BusState.DOWN
         self.reason = ""
         self._stopped_at = 0.0
-        # Called right before each SYNC, to take its time.
-        self.before_sync: Callable[[], None] | None = None
-        # Called with what all drives measured at a SYNC: its due time, q, v, trigger.
+        self.before_sync: Callable[[], None] = lambda: None
         self.measured: Callable[[float, FloatArray, FloatArray, float], None] = (
             lambda *sample: None
         )
         self._script: Script | None = None
-        self._is_cyclic = False  # SYNC runs and process data is watched.
-        self._is_lost = False
+        self._is_cyclic = False  # SYNCs are sent and process data is monitored.
+        self.is_lost = False
         self._reopen_at = 0.0
         self._next_heartbeat = 0.0
         self._last_cycle: float | None = None
@@ -88,11 +84,6 @@ class ArmBus:
         counted = ("cycles", "overruns", "missing", "foreign", "malformed")
         self._counts = dict.fromkeys(counted, 0)
         self._meter = LoadMeter(bus.bitrate)
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the way to the bus is lost."""
-        return self._is_lost
 
     @property
     def is_idle(self) -> bool:
@@ -104,19 +95,19 @@ class ArmBus:
     def start(self) -> None:
         """Begins bring-up: configure, verify, operational, enable, home."""
         self._follower.release()
-        self._begin(self._start_up(self.nodes))
+        self._begin(self._start_up(self._nodes.all))
 
     def acknowledge(self) -> None:
-        """Begins again after a stop; nodes that rebooted are configured anew.
+        """Restarts after a stop; configures nodes that rebooted.
 
         Raises:
-            BusError: Nothing is latched, or the cause is still there; names it.
+            BusError: Nothing is latched, or the cause persists; names it.
         """
         if self.state != BusState.STOPPED:
             raise BusError(
                 f"nothing to acknowledge: the bus is {self.state}.", code="PNT-BUS-001"
             )
-        if self._is_lost:
+        if self.is_lost:
             raise BusError(
                 f"cannot acknowledge, the bus is still lost: {self.reason}",
                 code="PNT-BUS-002",
@@ -128,25 +119,24 @@ class ArmBus:
         self.reason, self._stopped_at = "", 0.0
         self._follower.release()
         self._begin(
-            self._start_up([n for n in self.nodes if not n.is_healthy(self._now)])
+            self._start_up([n for n in self._nodes.all if not n.is_healthy(self._now)])
         )
 
     def push(self, points: Sequence[Setpoint]) -> None:
-        """Adds setpoints; while no motion is allowed they are dropped.
+        """Adds setpoints; drops them unless the drives are enabled.
 
         Raises:
-            ValueError: They are not in order of time, or not finite.
+            ValueError: The times do not increase, or a value is not finite.
         """
-        if self.state != BusState.ENABLED:
-            return
-        self._follower.push(points)
+        if self.state == BusState.ENABLED:
+            self._follower.push(points)
 
     def stop(self, reason: str, *, quick: bool = False) -> None:
         """Stops all axes, closes the gun and latches the reason.
 
         Args:
-            reason: Said in the feedback until it is acknowledged.
-            quick: By the drives' quick stop, else by a ramp that stays enabled.
+            reason: Stays in the feedback until it is acknowledged.
+            quick: By the drives' quick stop; else by a ramp, with the drives enabled.
         """
         was, self.io.trigger = self.state, 0.0
         if not self.reason:
@@ -174,28 +164,27 @@ class ArmBus:
     # Time.
 
     def cycle(self, now: float, *, overruns: int = 0) -> None:
-        """One cycle: SYNC, targets, gun; what came is read first.
+        """Runs one cycle: reads what was received, then sends SYNC, gun and targets.
 
         Args:
-            now: When it was due, s.
+            now: When the cycle was due, s.
             overruns: Cycles that were skipped before it.
         """
         self.poll(now)
         self._counts["overruns"] += overruns
         self._follower.fall_behind(overruns)
-        if self._is_cyclic and not self._is_lost:
+        if self._is_cyclic and not self.is_lost:
             self._note_measured()
             self._expect_answers()
             self._counts["cycles"] += 1
-            if self.before_sync is not None:
-                self.before_sync()
+            self.before_sync()
             self._send(Frame(SYNC_ID))
             self._follow(now)
             self._send_outputs()
         self._last_cycle = now
 
     def poll(self, now: float, timeout: float = 0.0) -> None:
-        """Reads frames, watches, and goes on with what runs.
+        """Receives frames, monitors the nodes and continues the running script.
 
         Args:
             now: Time, s.
@@ -203,7 +192,7 @@ class ArmBus:
         """
         self._now = now
         frames: list[Frame] = []
-        if self._is_lost:
+        if self.is_lost:
             self._reopen(now)
         else:
             try:
@@ -212,20 +201,20 @@ class ArmBus:
                 self._lose(f"bus lost: {error}")
         for frame in frames:
             self._take(frame, now)
-        if self._is_lost:
+        if self.is_lost:
             return
         if self.state != BusState.DOWN and now >= self._next_heartbeat:
             self._next_heartbeat = now + self._bus.timeouts.heartbeat / 3.0
-            state = bytes([OPERATIONAL])
+            state = bytes([NmtState.OPERATIONAL])
             self._send(Frame(HEARTBEAT_BASE + self._bus.master_id, state))
-        for node in self.nodes:
+        for node in self._nodes.all:
             node.poll(now)
-        self._watch(now)
+        self._monitor(now)
         self._advance_script()
 
     def feedback(self) -> Feedback:
         """Returns the state of the arm."""
-        q, v = self._actual()
+        q, v = self._nodes.joint_state()
         return Feedback(
             time=self._now,
             bus_state=self.state,
@@ -241,7 +230,7 @@ class ArmBus:
             buffered=len(self._follower),
             statistics=Statistics(
                 **self._counts,
-                retries=sum(node.sdo.retry_count for node in self.nodes),
+                retries=sum(node.sdo.retry_count for node in self._nodes.all),
                 load=self._meter.load(self._now),
             ),
         )
@@ -269,7 +258,7 @@ class ArmBus:
         if nodes:
             self._is_cyclic = False  # No SYNC while PDOs are mapped.
             yield from run_concurrently([node.bring_up() for node in nodes])
-        for node in self.nodes:
+        for node in self._nodes.all:
             node.got_tpdo, node.missed, node.alarm = False, 0, None
             node.start()
         for drive in self.drives:
@@ -277,23 +266,18 @@ class ArmBus:
         self._is_cyclic = True
         timeout = self._bus.timeouts.boot
         yield from run_concurrently(
-            node.wait(
-                lambda node=node: node.got_tpdo and node.nmt == OPERATIONAL,  # type: ignore[misc]
-                timeout,
-                "not operational",
-            )
-            for node in self.nodes
+            [node.wait_operational(timeout) for node in self._nodes.all]
         )
         if not self.io.is_chain_closed:
             raise BusError("e-stop: the chain is open.", code="PNT-BUS-004")
         yield from run_concurrently([drive.enable() for drive in self.drives])
         for drive in self.drives:
             yield from drive.home()
-        self._follower.stand(self._actual()[0])
+        self._follower.hold(self._nodes.joint_state()[0])
         self.state = BusState.ENABLED
 
     def _switch_off(self, standing: float) -> Script:
-        """Waits until the arm stands, at a time, s; then brakes and power."""
+        """Waits for the end of the ramp, a time in s; then brakes and power."""
         self.io.trigger = 0.0
         while self._now < standing:
             yield
@@ -303,10 +287,10 @@ class ArmBus:
         self._is_cyclic = False
         self.state = BusState.DOWN
 
-    # The cycle's parts.
+    # Parts of a cycle.
 
     def _follow(self, now: float) -> None:
-        """Takes the command of this cycle to the drives."""
+        """Hands the command of this cycle to the drives."""
         follower = self._follower
         if self.state != BusState.ENABLED and not follower.is_braking:
             return
@@ -319,21 +303,16 @@ class ArmBus:
         for drive, angle in zip(self.drives, axes, strict=True):
             drive.target = drive.units.counts(float(angle))
 
-    def _actual(self) -> tuple[FloatArray, FloatArray]:
-        """Positions and speeds of the joints as the drives last said."""
-        axes = np.array([d.units.angle(d.position) for d in self.drives])
-        speeds = np.array([d.units.speed(d.velocity) for d in self.drives])
-        return joints_from_axes(axes), joints_from_axes(speeds)
-
     def _note_measured(self) -> None:
-        """Passes on what answered the last SYNC, if all of it came."""
+        """Reports the answers to the last SYNC if they are complete."""
         if self._last_cycle is not None and all(d.is_measured for d in self.drives):
-            self.measured(self._last_cycle, *self._actual(), self.io.trigger)
+            q, v = self._nodes.joint_state()
+            self.measured(self._last_cycle, q, v, self.io.trigger)
 
     def _send_outputs(self) -> None:
         if not self._is_cyclic:
             return
-        self.io.tell()  # First, so that the gun is never last.
+        self.io.send_outputs()  # First, so that the gun is never last.
         for drive in self.drives:
             self._send(drive.rpdo())
 
@@ -346,25 +325,21 @@ class ArmBus:
             for drive in self.drives:
                 drive.got_tpdo = False
 
-    # The watches.
-
-    def _watch(self, now: float) -> None:
-        for node in self.nodes:
-            if node.alarm is not None and self._is_cyclic:
-                alarm, node.alarm = node.alarm, None
-                if self.state != BusState.STARTING or not node.is_configured:
-                    self.stop(alarm, quick=True)
-        if (
-            self.state not in (BusState.ENABLED, BusState.STOPPED)
-            or not self._is_cyclic
-        ):
+    def _monitor(self, now: float) -> None:
+        """Stops the arm for alarms, and while it is controlled for all else."""
+        if not self._is_cyclic:
             return
-        held = self.state == BusState.ENABLED or self._follower.is_braking
-        complaint = first_stop_reason(
-            self._bus, self.drives, self.io, now=now, must_be_enabled=held
-        )
-        if complaint is not None and held:
-            self.stop(complaint, quick=True)
+        for node in self._nodes.all:
+            alarm, node.alarm = node.alarm, None
+            is_expected = self.state == BusState.STARTING and node.is_configured
+            if alarm is not None and not is_expected:
+                self.stop(alarm, quick=True)
+        if self.state == BusState.ENABLED or (
+            self.state == BusState.STOPPED and self._follower.is_braking
+        ):
+            reason = first_stop_reason(self._bus, self.drives, self.io, now=now)
+            if reason is not None:
+                self.stop(reason, quick=True)
 
     # The transport.
 
@@ -374,14 +349,14 @@ class ArmBus:
             if frame.cob_id & ERROR_BUS_OFF:
                 self._lose("bus-off: the CAN controller gave up.")
             return
-        node = self._by_id.get(frame.cob_id & 0x7F)
+        node = self._nodes.find(frame.cob_id)
         if node is None or frame.cob_id < SYNC_ID:
             self._counts["foreign"] += 1
         elif not node.take(frame, now):
             self._counts["malformed"] += 1
 
     def _send(self, frame: Frame) -> None:
-        if self._is_lost:
+        if self.is_lost:
             return
         self._meter.note(frame, self._now)
         try:
@@ -390,7 +365,7 @@ class ArmBus:
             self._lose(f"bus lost: {error}")
 
     def _lose(self, reason: str) -> None:
-        self._is_lost = True
+        self.is_lost = True
         self._reopen_at = self._now + _REOPEN_EVERY
         self.stop(reason, quick=True)
 
@@ -403,8 +378,8 @@ class ArmBus:
         except TransportError as error:
             _LOGGER.debug("still lost: %s", error)
             return
-        _LOGGER.warning("the bus is back; the stop stays until it is acknowledged.")
-        self._is_lost = False
-        for node in self.nodes:
+        _LOGGER.warning("the bus is back; the stop stays latched until acknowledged.")
+        self.is_lost = False
+        for node in self._nodes.all:
             node.heard = now
             node.missed = 0

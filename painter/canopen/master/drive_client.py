@@ -21,22 +21,25 @@ from painter.canopen.protocol.frames import RPDO_BASES, TPDO_BASES, Frame
 from painter.canopen.protocol.od_types import pack
 from painter.errors import BusError
 
-_LOST_AFTER = 0.2  # A process data object that is owed for so long was lost, s.
-_STEP_SETTLE = 0.05  # Time a homing drive gets to show its old bits no longer, s.
+_LOST_AFTER = 0.2  # A TPDO that is due for so long was lost, s.
+_STEP_SETTLE = 0.05  # Time in which a homing drive clears its old status bits, s.
 
 
 class DriveClient(NodeClient):
     """One drive as the master sees it.
 
     Attributes:
-        state: What the last statusword said; None before.
-        statusword: The last one.
-        position: Last actual position, drive counts.
+        mode: Mode of operation in which targets are streamed.
+        units: Of the drive.
+        state: State in the last statusword; None before the first.
+        statusword: Last one received.
+        position: Last actual position, counts.
         velocity: Last actual velocity, drive units.
-        following_error: Last one, counts.
+        following_error: Last one received, counts.
         target: Commanded position, counts.
         controlword: Commanded.
-        is_homed: Whether its zero is known since its last boot-up.
+        is_homed: Whether it has been homed since its last boot-up.
+        is_homing: Whether homing runs.
     """
 
     def __init__(
@@ -83,26 +86,27 @@ class DriveClient(NodeClient):
         self.following_error = 0
         self.target = 0
         self.controlword = 0
-        # What SYNCs asked for and has not come, and for how many SYNCs some was owed.
+        # Answers to SYNCs not yet received, and for how many SYNCs there were any.
         self._owed = self._owing = 0
         self.is_homed = False
         self.is_homing = False
 
     def is_healthy(self, now: float) -> bool:
-        """See `NodeClient.is_healthy`; its process data comes too."""
-        few = self.missed * self._cycle < self._timeouts.tpdo
-        return few and super().is_healthy(now)
+        """See `NodeClient.is_healthy`; its TPDOs must arrive as well."""
+        is_fresh = self.missed * self._cycle < self._timeouts.tpdo
+        return is_fresh and super().is_healthy(now)
 
     @property
     def is_measured(self) -> bool:
-        """Whether position and speed are those of the last SYNC, not of one before."""
+        """Whether position and speed are those of the last SYNC, not an earlier one."""
         return self.got_tpdo and self._owed == 0
 
     def expect_answer(self) -> bool:
-        """Expects a TPDO1 for a SYNC; returns whether one came since the one before.
+        """Expects a TPDO1 for a SYNC; returns whether the last SYNC was answered.
 
-        One that comes late, when the next SYNC is out, would pass for an answer to that
-        one: the arm 5 ms from where it was. What is owed for long was lost.
+        Answers are counted: a late one that arrives after the next SYNC must not pass
+        for the answer to that SYNC, which would report the arm 5 ms late. An answer
+        that stays out for `_LOST_AFTER` counts as lost.
         """
         self.missed = 0 if self.got_tpdo else self.missed + 1
         self._owing = self._owing + 1 if self._owed else 0
@@ -111,7 +115,7 @@ class DriveClient(NodeClient):
         return self.got_tpdo
 
     def forget_owed(self) -> None:
-        """Expects nothing: SYNCs begin anew."""
+        """Forgets missing answers, before SYNCs start."""
         self._owed = self._owing = 0
 
     def take_process_data(self, kind: int, data: bytes) -> bool:
@@ -148,12 +152,10 @@ class DriveClient(NodeClient):
             statusword=self.statusword,
         )
 
-    def stop_reason(self, *, must_be_enabled: bool) -> str | None:
-        """Returns what in the statusword must stop the arm, or None."""
+    def stop_reason(self) -> str | None:
+        """Returns why the statusword must stop an enabled arm, or None."""
         if self.state in (State.FAULT, State.FAULT_REACTION):
             return f"{self.name}: drive fault, {self.fault_text()}."
-        if not must_be_enabled:
-            return None
         if self.state != State.ENABLED:
             shown = "no known state" if self.state is None else self.state.value
             return f"{self.name}: left OPERATION ENABLED, is in {shown}."
@@ -164,10 +166,10 @@ class DriveClient(NodeClient):
         return None
 
     def check_device(self) -> Script:
-        """Compares encoder and modes with the bus file, as far as the drive knows them.
+        """Compares encoder and modes with the bus file, where the drive has them.
 
         Raises:
-            BusError: The drive says something else.
+            BusError: They differ.
         """
         self.state, self.controlword = None, 0
         self.is_homed = self.config.homing.kind == "none"
@@ -178,7 +180,7 @@ class DriveClient(NodeClient):
             if abs(found - self.config.counts_per_turn) > 0.5:
                 raise BusError(
                     f"{self.name}: wrong unit: the encoder has {found:g} counts a turn "
-                    f"(608Fh), the bus file says {self.config.counts_per_turn:g}.",
+                    f"(608Fh), {self.config.counts_per_turn:g} in the bus file.",
                     code="PNT-BUS-005",
                 )
         if self.plan.device.find(0x6502):
@@ -191,10 +193,10 @@ class DriveClient(NodeClient):
                 )
 
     def enable(self) -> Script:
-        """Steps up to OPERATION ENABLED; the target is the actual position until then.
+        """Steps up to OPERATION ENABLED; until then the target is the actual position.
 
         Raises:
-            BusError: A step took too long; names it and where the drive stayed.
+            BusError: A step took too long; names the state the drive is in.
         """
         while True:
             self.target = self.position
@@ -233,10 +235,10 @@ class DriveClient(NodeClient):
             )
 
     def home(self) -> Script:
-        """Lets the drive find its zero in homing mode, then streams again.
+        """Runs the drive's homing mode, then streams targets again.
 
         Raises:
-            BusError: The drive reported an error or took too long.
+            BusError: The drive reports an error or takes too long.
         """
         if self.config.homing.kind == "none" or self.is_homed:
             return
@@ -296,11 +298,12 @@ class DriveClient(NodeClient):
         while (yield from self.read(0x6061)) != mode:
             if self.now - start > self._timeouts.transition:
                 raise BusError(
-                    f"{self.name}: does not change to {mode.name}.", code="PNT-BUS-009"
+                    f"{self.name}: does not change to mode {mode.name}.",
+                    code="PNT-BUS-009",
                 )
 
     def _leave(self, state: State | None) -> Script:
-        """Waits until the drive is in another state, longer where the brake moves."""
+        """Waits until the drive leaves a state; longer where the brake moves."""
         limits = self._timeouts
         slow = state in (State.SWITCHED_ON, State.QUICK_STOP, State.FAULT_REACTION)
         shown = "no statusword" if state is None else f"stays in {state.value}"

@@ -1,4 +1,4 @@
-"""What the bus tells the rest of the program, and how it fared."""
+"""State of the bus and of the arm, and statistics of the cyclic loop."""
 
 import enum
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from perception.ground import FloatArray
 
 
 class BusState(enum.StrEnum):
-    """What the bus as a whole does."""
+    """State of the bus as a whole."""
 
     DOWN = "down"  # Not started, or switched off.
     STARTING = "starting"  # Bring-up, enabling or homing runs.
     ENABLED = "enabled"  # All drives enabled; setpoints are followed.
-    STOPPED = "stopped"  # A reason is latched; acknowledge() starts again.
+    STOPPED = "stopped"  # A reason is latched until acknowledge().
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class AxisStatus:
     Attributes:
         name: Axis name.
         state: CiA 402 state as text; "UNKNOWN" before the first statusword.
-        code: Emergency code that has not ended; 0 for none.
+        code: Active emergency code; 0 for none.
         following_error: Of the axis, rad.
         statusword: 6041h.
     """
@@ -36,17 +36,17 @@ class AxisStatus:
 
 @dataclass(frozen=True)
 class Statistics:
-    """How the cyclic loop fared since it began.
+    """Counts of the cyclic loop since it began.
 
     Attributes:
         cycles: SYNCs sent.
-        overruns: Cycles that were skipped because one came too late.
-        missing: TPDOs that did not come before the next SYNC.
-        retries: SDO requests that were sent again.
+        overruns: Cycles skipped because one was too late.
+        missing: TPDOs not received before the next SYNC.
+        retries: SDO requests sent again.
         foreign: Frames that no node of the bus file sends.
         malformed: Frames of its nodes that fit no service: of a wrong length, or
-            answers that nobody asked for.
-        load: Worst-case share of the bus that the frames of the last second take.
+            answers without a request.
+        load: Worst-case bus load of the last second, 0 to 1.
     """
 
     cycles: int = 0
@@ -64,18 +64,18 @@ class Feedback:
 
     Attributes:
         time: Clock of the bus, s.
-        bus_state: What the bus does.
-        reason: Why it stopped; empty while it did not.
-        stopped_at: When it stopped, s; 0 while it did not.
+        bus_state: State of the bus.
+        reason: Why the arm was stopped; empty if it was not.
+        stopped_at: When it was stopped, s; 0 if it was not.
         q: (5,) measured joint positions, rad.
         v: (5,) measured joint speeds, rad/s.
         q_commanded: (5,) rad, as sent to the drives.
         trigger: As sent to the gun, 0 to 1.
         axes: The drives.
-        is_chain_closed: E-stop chain.
-        pressure: Pump, Pa.
-        buffered: Setpoints held.
-        statistics: How the loop fared.
+        is_chain_closed: Whether the e-stop chain is closed.
+        pressure: Of the pump, Pa.
+        buffered: Number of setpoints held.
+        statistics: Counts of the loop.
     """
 
     time: float

@@ -1,4 +1,4 @@
-"""What the arm is told each cycle: setpoints, their underrun, the ramp of a stop."""
+"""The command of each cycle: from setpoints, on their underrun, on a stop ramp."""
 
 from collections.abc import Sequence
 
@@ -14,23 +14,23 @@ from painter.canopen.master.setpoints import (
 )
 from perception.ground import FloatArray
 
-# A target sent after SYNC k is taken at SYNC k + 1 and reached at SYNC k + 2: that far
-# ahead setpoints are looked up, so that the arm is there when its setpoint says.
+# Drives take a target sent after SYNC k at SYNC k + 1 and reach it at SYNC k + 2.
+# Setpoints are sampled that far ahead, so that the arm is there at the setpoint's time.
 TARGET_CYCLES = 2
-# The valve's output is sent at once. Setpoints and cycles both round the time of an
-# edge up, by half a cycle on average: one cycle ahead, edges are on time on average.
+# The valve acts at once. Setpoints and cycles both round the time of an edge up, by
+# half a cycle on average: sampled one cycle ahead, edges are on time on average.
 TRIGGER_CYCLES = 1
-# Share by which the arm is faster until a skipped cycle is made up for; below what the
-# guard forgives.
+# Share by which the arm is faster until it has caught up a skipped cycle; below the
+# speed margin of the guard.
 CATCH_UP = 0.02
 
 
 class SetpointFollower:
-    """Follows setpoints in joint space and says when they must not be followed.
+    """Follows setpoints in joint space; brakes when they violate a limit.
 
     Attributes:
-        q: (5,) rad, where the arm is commanded to be.
-        v: (5,) rad/s, how fast.
+        q: (5,) commanded positions, rad.
+        v: (5,) commanded speeds, rad/s.
         trigger: Commanded share of nominal flow, 0 to 1.
     """
 
@@ -42,13 +42,13 @@ class SetpointFollower:
         timeout: float,
         sync_time: float = 0.0,
     ) -> None:
-        """Creates a follower that stands at zero.
+        """Creates a follower that holds zero.
 
         Args:
             joints: Limits in the order of `units.JOINTS`.
             cycle: Time between two steps, s.
-            timeout: Time without a setpoint while moving or spraying, s.
-            sync_time: From when a SYNC is due until drives have it, s.
+            timeout: Longest time without a setpoint while moving or spraying, s.
+            sync_time: Time a SYNC takes on the bus, s.
         """
         self._joints = joints
         self._cycle = cycle
@@ -65,54 +65,54 @@ class SetpointFollower:
 
     @property
     def is_braking(self) -> bool:
-        """Whether a ramp is followed, or held at its end."""
+        """Whether a stop ramp runs or is held at its end."""
         return self._ramp is not None
 
     @property
     def braking_time(self) -> float:
-        """How long the ramp takes, s; 0 without one."""
+        """Duration of the stop ramp, s; 0 without one."""
         return 0.0 if self._ramp is None else self._ramp.duration
 
     def push(self, points: Sequence[Setpoint]) -> None:
         """Adds setpoints.
 
         Raises:
-            ValueError: They are not in order of time, or not finite.
+            ValueError: Times do not increase, or a value is not finite.
         """
         self._buffer.push(points)
 
-    def stand(self, q: FloatArray) -> None:
-        """Forgets everything and stands at a position, (5,) rad."""
+    def hold(self, q: FloatArray) -> None:
+        """Drops setpoints and ramp, and holds a position, (5,) rad."""
         self.release()
         self.q, self.v = q, np.zeros(5)
 
     def release(self) -> None:
-        """Forgets setpoints and ramp, and closes the gun."""
+        """Drops setpoints and ramp, and closes the gun."""
         self._buffer.clear()
         self._ramp = None
         self.trigger = 0.0
 
     def brake(self, now: float) -> None:
-        """Begins a controlled stop from the present command; the gun closes."""
+        """Starts a controlled stop from the present command; the gun closes."""
         self.release()
         self._ramp = StopRamp(now - self._behind, self.q, self.v, self._joints)
 
     def fall_behind(self, cycles: int) -> None:
-        """Lets the setpoints wait for cycles that were skipped.
+        """Delays the setpoints by cycles that were skipped.
 
-        Drives take a target a cycle: two cycles' way in one would be twice as fast.
-        What is behind is made up for slowly.
+        Drives take one target a cycle: the distance of two cycles in one would double
+        the speed. The delay is caught up slowly.
         """
         self._behind += cycles * self._cycle
 
     def step(self, now: float) -> str | None:
-        """Goes on to the command of a cycle.
+        """Sets the command of a cycle.
 
         Args:
             now: When the cycle was due, s.
 
         Returns:
-            Why the setpoints were not followed (the arm brakes then), or None.
+            The limit that the setpoints violate (the arm brakes then), or None.
         """
         self._behind = max(0.0, self._behind - CATCH_UP * self._cycle)
         now -= self._behind
@@ -124,10 +124,10 @@ class SetpointFollower:
             self._take(Sample(self.q, np.zeros(5), 0.0, 0.0))
             return None
         if sample.lag > 0.0 and sample.is_active:
-            # Late, but not yet too late: go on as the last setpoint said.
+            # Late, but within the time-out: extrapolate the last setpoint.
             moved = sample.q + sample.v * sample.lag
             sample = Sample(moved, sample.v, sample.trigger, sample.lag)
-        problem = self._guard.objection(sample, self.q, self._cycle)
+        problem = self._guard.violation(sample, self.q, self._cycle)
         if problem is not None:
             self.brake(now + self._behind)
             return problem

@@ -17,7 +17,7 @@ class IoClient(NodeClient):
         trigger: Commanded share of nominal flow, 0 to 1; 0 closes the valve.
         inputs: Last digital inputs; None before the first.
         pressure: Last pump pressure, Pa.
-        repeat_at: When the gun is to be told again, s.
+        repeat_at: When the outputs are sent again, s.
     """
 
     def __init__(self, bus: BusConfig, send: Callable[[Frame], None]) -> None:
@@ -40,7 +40,7 @@ class IoClient(NodeClient):
 
     @property
     def is_chain_closed(self) -> bool:
-        """Whether the e-stop chain is closed; False before it is known."""
+        """Whether the e-stop chain is closed; False before the first TPDO."""
         return bool((self.inputs or 0) >> self._config.estop_bit & 1)
 
     def take_process_data(self, kind: int, data: bytes) -> bool:
@@ -54,17 +54,17 @@ class IoClient(NodeClient):
         return True
 
     def poll(self, now: float) -> None:
-        """Lets time pass; tells the gun what it was told half a cycle ago."""
+        """Sets the clock; repeats the outputs half a cycle after they were sent."""
         super().poll(now)
         if now >= self.repeat_at:
             self.repeat_at = math.inf
             self._send(self.rpdo())
 
-    def tell(self) -> None:
-        """Sends valve and flow now, and once more in half a cycle.
+    def send_outputs(self) -> None:
+        """Sends valve and flow now, and again half a cycle later.
 
-        The node closes the gun by itself when the master has been silent for a cycle.
-        Said once a cycle, a word that is a little late would be as good as none.
+        The node closes the gun by itself when it receives nothing for a cycle. With one
+        frame a cycle, a frame that is slightly late would trip that deadline.
         """
         if self.is_configured:
             self._send(self.rpdo())
@@ -78,7 +78,7 @@ class IoClient(NodeClient):
         return Frame(RPDO_BASES[0] + self.node_id, data)
 
     def stop_reason(self) -> str | None:
-        """Returns what in the inputs must stop the arm, or None."""
+        """Returns why the inputs must stop the arm, or None."""
         if not self.is_chain_closed:
             return "e-stop: the chain is open."
         if self.trigger > 0.0 and self.pressure < self._config.pressure_low:

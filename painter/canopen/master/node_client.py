@@ -13,14 +13,12 @@ from painter.canopen.protocol.frames import (
     SDO_TO_CLIENT,
     Frame,
 )
+from painter.canopen.protocol.nmt import NmtCommand, NmtState
 from painter.canopen.protocol.sdo import SdoClient
 from painter.errors import BusError
 
 Script = Generator[None, None, None]
 
-NMT_START = 1
-NMT_RESET_NODE = 129
-OPERATIONAL = 5
 _SAVE = b"save"
 _LOAD = b"load"
 _STORE_TIME = 1.0
@@ -28,20 +26,22 @@ _IDENTITY = ("vendor", "product", "revision", "serial")
 
 
 class NodeClient:
-    """What the master knows of a node and does with it.
+    """State of one node, and the services the master uses.
 
     Attributes:
         name: Axis name, or "io".
         node_id: 1 to 127.
-        sdo: The one way to its objects.
+        plan: What is written to it.
+        sdo: Its SDO client.
         now: Clock of the bus at the last poll, s.
         is_configured: Whether it was configured since its last boot-up.
-        heard: When its last heartbeat came, s.
-        nmt: State the last heartbeat said; None before.
-        emcy: Code of the last emergency that has not ended; 0 for none.
+        heard: When its last heartbeat was received, s.
+        nmt: State in the last heartbeat; None before the first.
+        emcy: Code of the active emergency; 0 for none.
         history: Last emergencies: time, code.
-        missed: SYNCs in a row without a process data object.
-        alarm: What happened that must stop the arm; taken by the bus.
+        got_tpdo: Whether a TPDO was received since the flag was cleared.
+        missed: SYNCs in a row without a TPDO.
+        alarm: Event that must stop the arm; the bus takes it.
     """
 
     def __init__(
@@ -63,12 +63,12 @@ class NodeClient:
             name: Axis name, or "io".
             node_id: 1 to 127.
             send: Sends a frame.
-            identity: What 1018h must say.
-            timeouts: The bus file's.
+            identity: Expected values of 1018h.
+            timeouts: Of the bus file.
             plan: What is written to it.
             profile: Device profile in the low half of 1000h, e.g. 402.
-            restore: Whether it gets its defaults back before it is configured.
-            store: Whether it keeps its configuration.
+            restore: Whether defaults are restored (1011h) before it is configured.
+            store: Whether it stores its configuration (1010h).
         """
         self.name = name
         self.node_id = node_id
@@ -93,7 +93,7 @@ class NodeClient:
         self._booted = False
 
     def take(self, frame: Frame, now: float) -> bool:
-        """Takes a frame; returns False for one that fits no service of the node."""
+        """Takes a frame; returns False if it fits no service of the node."""
         self.now = now
         data = frame.data
         kind = frame.cob_id - self.node_id
@@ -111,17 +111,17 @@ class NodeClient:
         """Takes a TPDO; `kind` is its COB-ID without the node-ID.
 
         Returns:
-            Whether it is one of the node's, and whole.
+            Whether the node sends such a TPDO, of this length.
         """
         return False
 
     def is_healthy(self, now: float) -> bool:
-        """Whether it can go on after a stop without being configured anew."""
+        """Whether it can restart after a stop without a new configuration."""
         recent = now - self.heard <= self._timeouts.heartbeat
-        return self.is_configured and recent and self.nmt == OPERATIONAL
+        return self.is_configured and recent and self.nmt == NmtState.OPERATIONAL
 
     def poll(self, now: float) -> None:
-        """Lets time pass."""
+        """Sets the clock and sends what is due."""
         self.now = now
         self.sdo.poll(now)
 
@@ -131,7 +131,7 @@ class NodeClient:
         """Yields until a condition holds.
 
         Raises:
-            BusError: It did not in time; "name: failure within timeout s".
+            BusError: It does not hold in time: "name: failure within timeout s".
         """
         start = self.now
         while not condition():
@@ -141,8 +141,20 @@ class NodeClient:
                 )
             yield
 
+    def wait_operational(self, timeout: float) -> Script:
+        """Yields until the node is operational and has sent a TPDO.
+
+        Raises:
+            BusError: It is not within `timeout` s.
+        """
+        yield from self.wait(
+            lambda: self.got_tpdo and self.nmt == NmtState.OPERATIONAL,
+            timeout,
+            "not operational",
+        )
+
     def bring_up(self) -> Script:
-        """Resets the node, checks who it is, and configures it.
+        """Resets the node, checks its identity, and configures it.
 
         Raises:
             BusError: A step failed; names node and step.
@@ -164,7 +176,7 @@ class NodeClient:
         self.is_configured = True
 
     def check_device(self) -> Script:
-        """Reads what the device says of itself; raises BusError if it does not fit."""
+        """Checks objects of the device; raises BusError for one that does not match."""
         yield from ()
 
     def read(self, index: int, sub: int = 0) -> Generator[None, None, int]:
@@ -173,11 +185,11 @@ class NodeClient:
         return int.from_bytes(data, "little")
 
     def start(self) -> None:
-        """Commands OPERATIONAL; the heartbeat tells when it is."""
-        self._send(Frame(NMT_ID, bytes([NMT_START, self.node_id])))
+        """Commands OPERATIONAL; a heartbeat confirms it."""
+        self._send(Frame(NMT_ID, bytes([NmtCommand.START, self.node_id])))
 
     def fault_text(self) -> str:
-        """Returns the emergency that has not ended, as text."""
+        """Returns the active emergency as text."""
         return f"EMCY {self.emcy:04X}h, {emcy_text(self.emcy)}"
 
     def _reset(self) -> Script:
@@ -185,7 +197,7 @@ class NodeClient:
         self.nmt = None
         self.sdo.clear()
         self._booted = False
-        self._send(Frame(NMT_ID, bytes([NMT_RESET_NODE, self.node_id])))
+        self._send(Frame(NMT_ID, bytes([NmtCommand.RESET_NODE, self.node_id])))
         timeout = self._timeouts.boot
         yield from self.wait(lambda: self._booted, timeout, "no boot-up message")
 
@@ -204,7 +216,7 @@ class NodeClient:
             if found != wanted:
                 raise BusError(
                     f"{self.name}: wrong device: {field} (1018h:{sub}) is {found:X}h, "
-                    f"the bus file says {wanted:X}h.",
+                    f"{wanted:X}h in the bus file.",
                     code="PNT-BUS-013",
                 )
 

@@ -16,16 +16,16 @@ from painter.canopen.protocol.sdo import SdoClient
 from painter.errors import BusError, InputError
 
 _OFF = 1 << 31
-# Of a PDO's COB-ID, what must be read back: valid bit and identifier. Bit 30 (no RTR)
-# is fixed in some devices. Source: CiA 301 v4.2.0, 7.5.2.35.
+# Bits of a PDO's COB-ID that are compared on reading back: valid bit and identifier.
+# Bit 30 (no RTR) is fixed in some devices. Source: CiA 301 v4.2.0, 7.5.2.35.
 _COB_ID_MASK = 0x800007FF
-# Time a following error must last, ms: two cycles at 200 Hz.
+# Time for which a following error must last, ms: two cycles at 200 Hz.
 _FOLLOWING_ERROR_TIME = 10
 _IO_EVENT_MS = 20
 
 Objects = Sequence[tuple[int, int, int]]  # Index, sub, bits.
 
-# SYNC-driven second TPDO: every other cycle, so that five drives stay below 40 % load.
+# TPDO2 is sent every other cycle, so that five drives stay below 40 % bus load.
 SLOW_EVERY = 2
 DRIVE_TPDO: Objects = ((0x6041, 0, 16), (0x6064, 0, 32))
 DRIVE_SLOW_TPDO: Objects = ((0x606C, 0, 32), (0x60F4, 0, 32))
@@ -47,14 +47,14 @@ class Entry:
         index: Object.
         sub: Sub-index.
         value: What to write.
-        why: Its name in messages.
-        mask: Bits that must be read back.
+        name: In messages.
+        mask: Bits that are compared on reading back.
     """
 
     index: int
     sub: int
     value: int
-    why: str
+    name: str
     mask: int = -1
 
 
@@ -63,24 +63,27 @@ class ConfigPlan:
     """What is written to one node, in order.
 
     Attributes:
+        device: Description of the node.
         entries: Objects to write.
-        notes: What the device cannot be told, and what that means.
+        notes: Optional objects that the device lacks, and the consequence.
     """
 
     device: DeviceDescription
     entries: list[Entry] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def need(self, index: int, sub: int, value: int, why: str, mask: int = -1) -> None:
-        """Adds an object that must be there.
+    def require(
+        self, index: int, sub: int, value: int, name: str, mask: int = -1
+    ) -> None:
+        """Adds an object that the device must have.
 
         Raises:
-            InputError: The device has no such object, or cannot take the value.
+            InputError: The device lacks the object, or its range excludes the value.
         """
         info = self.device.find(index, sub)
-        if info is None or info.access not in ("rw", "wo"):
+        if info is None or not self.device.is_writable(index, sub):
             raise InputError(
-                f"{self.device.source}: no {index:04X}h:{sub} for {why}.",
+                f"{self.device.source}: no writable {index:04X}h:{sub} for {name}.",
                 code="PNT-BUS-014",
             )
         low, high = bounds(info.data_type)
@@ -89,45 +92,47 @@ class ConfigPlan:
             high = min(high, int(info.high)) if isinstance(info.high, int) else high
         if not low <= value <= high:
             raise InputError(
-                f"{self.device.source}: {why} ({index:04X}h:{sub}) must be {low} to "
+                f"{self.device.source}: {name} ({index:04X}h:{sub}) must be {low} to "
                 f"{high}, got {value}.",
                 code="PNT-BUS-015",
             )
-        self.entries.append(Entry(index, sub, value, why, mask))
+        self.entries.append(Entry(index, sub, value, name, mask))
 
-    def want(self, index: int, sub: int, value: int, why: str, without: str) -> None:
-        """Adds an object that may be missing; then notes what that means."""
+    def request(
+        self, index: int, sub: int, value: int, name: str, otherwise: str
+    ) -> None:
+        """Adds an object that the device may lack; then notes what applies instead."""
         info = self.device.find(index, sub)
-        if info is None or info.access not in ("rw", "wo"):
-            self.notes.append(f"no {index:04X}h ({why}): {without}")
+        if info is None or not self.device.is_writable(index, sub):
+            self.notes.append(f"no {index:04X}h ({name}): {otherwise}")
         elif info.low == info.high != value and info.low is not None:
-            self.notes.append(f"{index:04X}h ({why}) is fixed to {info.low!r}.")
+            self.notes.append(f"{index:04X}h ({name}) is fixed to {info.low!r}.")
         else:
-            self.need(index, sub, value, why)
+            self.require(index, sub, value, name)
 
     def pdo(
         self, parameters: int, maps: int, cob_id: int, kind: int, objects: Objects
     ) -> None:
-        """Adds a PDO: off, emptied, mapped, counted, on.
+        """Adds a PDO: off, mapping cleared, entries mapped and counted, on.
 
         Source: CiA 301 v4.2.0, 7.5.2.36 (the order of these steps).
         """
-        self.need(parameters, 1, _OFF | cob_id, "PDO off", _COB_ID_MASK)
-        self.need(parameters, 2, kind, "transmission type")
-        self.need(maps, 0, 0, "mapping cleared")
+        self.require(parameters, 1, _OFF | cob_id, "PDO off", _COB_ID_MASK)
+        self.require(parameters, 2, kind, "transmission type")
+        self.require(maps, 0, 0, "mapping cleared")
         for i, (index, sub, bits) in enumerate(objects, start=1):
             entry = index << 16 | sub << 8 | bits
-            self.need(maps, i, entry, f"mapping of {index:04X}h")
-        self.need(maps, 0, len(objects), "mapped objects")
-        self.need(parameters, 1, cob_id, "COB-ID", _COB_ID_MASK)
+            self.require(maps, i, entry, f"mapping of {index:04X}h")
+        self.require(maps, 0, len(objects), "mapped objects")
+        self.require(parameters, 1, cob_id, "COB-ID", _COB_ID_MASK)
 
     def pdos_off(self, used: Sequence[int]) -> None:
-        """Switches off PDOs that are not used but there."""
+        """Switches off the PDOs of the device that are not used."""
         for base, cob_ids in ((0x1400, RPDO_BASES), (0x1800, TPDO_BASES)):
             for n in range(4):
                 if base + n not in used and self.device.is_writable(base + n, 1):
                     off = _OFF | cob_ids[n]
-                    self.need(base + n, 1, off, "PDO off", _OFF)
+                    self.require(base + n, 1, off, "PDO off", _OFF)
 
 
 def plan_drive(
@@ -136,38 +141,42 @@ def plan_drive(
     device: DeviceDescription,
     limits: DriveLimits,
 ) -> ConfigPlan:
-    """Returns what a drive is told.
+    """Returns the configuration of a drive.
 
     Raises:
-        InputError: The device lacks an object that must be there, or cannot take a
-            value; names the object and the bound.
+        InputError: The device lacks a required object, or its range excludes a value;
+            names the object and the bound.
     """
     mode = choose_mode(device)
     if mode is None:
-        raise InputError(f"{device.source}: neither CSP nor IP.", code="PNT-BUS-016")
+        raise InputError(
+            f"{device.source}: has neither CSP nor IP mode.", code="PNT-BUS-016"
+        )
     plan, node = ConfigPlan(device), drive.node_id
-    plan.need(0x6060, 0, mode, "mode of operation")
+    plan.require(0x6060, 0, mode, "mode of operation")
     milliseconds = round(bus.cycle * 1e3)
-    plan.need(0x60C2, 1, milliseconds, "interpolation period, ms")
-    plan.want(0x60C2, 2, -3, "unit of the interpolation period", "taken as ms.")
-    host = "only the host limits it."
-    plan.want(0x607D, 1, limits.position[0], "lowest position", host)
-    plan.want(0x607D, 2, limits.position[1], "highest position", host)
-    plan.want(0x607F, 0, limits.profile_velocity, "greatest velocity", host)
-    plan.want(0x6080, 0, limits.motor_speed, "greatest motor speed, rpm", host)
-    plan.want(0x60C5, 0, limits.acceleration, "greatest acceleration", host)
-    ramp = "the drive's own ramp."
-    plan.want(0x6085, 0, limits.quick_stop, "quick stop deceleration", ramp)
-    plan.want(0x6084, 0, limits.quick_stop, "deceleration", ramp)
-    plan.need(0x6065, 0, limits.following_error, "following error window")
-    plan.want(0x6066, 0, _FOLLOWING_ERROR_TIME, "following error time", "at once.")
-    options, own = drive.options, "the drive's own reaction."
-    plan.want(0x605A, 0, options.quick_stop, "quick stop option", own)
-    plan.want(0x605B, 0, options.shutdown, "shutdown option", own)
-    plan.want(0x605C, 0, options.disable, "disable option", own)
-    plan.want(0x605D, 0, options.halt, "halt option", own)
-    plan.want(0x605E, 0, options.fault, "fault reaction option", own)
-    plan.want(0x6007, 0, options.abort, "abort connection option", own)
+    plan.require(0x60C2, 1, milliseconds, "interpolation period, ms")
+    plan.request(0x60C2, 2, -3, "unit of the interpolation period", "taken as ms.")
+    host = "only the host enforces this limit."
+    plan.request(0x607D, 1, limits.position[0], "position limit, lower", host)
+    plan.request(0x607D, 2, limits.position[1], "position limit, upper", host)
+    plan.request(0x607F, 0, limits.profile_velocity, "velocity limit", host)
+    plan.request(0x6080, 0, limits.motor_speed, "motor speed limit, rpm", host)
+    plan.request(0x60C5, 0, limits.acceleration, "acceleration limit", host)
+    ramp = "the drive uses its own ramp."
+    plan.request(0x6085, 0, limits.quick_stop, "quick stop deceleration", ramp)
+    plan.request(0x6084, 0, limits.quick_stop, "deceleration", ramp)
+    plan.require(0x6065, 0, limits.following_error, "following error window")
+    plan.request(
+        0x6066, 0, _FOLLOWING_ERROR_TIME, "following error time", "it trips at once."
+    )
+    options, own = drive.options, "the drive reacts as its maker chose."
+    plan.request(0x605A, 0, options.quick_stop, "quick stop option", own)
+    plan.request(0x605B, 0, options.shutdown, "shutdown option", own)
+    plan.request(0x605C, 0, options.disable, "disable option", own)
+    plan.request(0x605D, 0, options.halt, "halt option", own)
+    plan.request(0x605E, 0, options.fault, "fault reaction option", own)
+    plan.request(0x6007, 0, options.abort, "abort connection option", own)
     _plan_monitoring(plan, bus)
     plan.pdos_off((0x1400, 0x1800, 0x1801))
     plan.pdo(0x1400, 0x1600, RPDO_BASES[0] + node, 1, drive_rpdo(mode))
@@ -178,39 +187,39 @@ def plan_drive(
 
 
 def plan_io(bus: BusConfig, device: DeviceDescription) -> ConfigPlan:
-    """Returns what the I/O node is told: outputs go off when the master is lost."""
+    """Returns the configuration of the I/O node: outputs go off without the master."""
     plan, node = ConfigPlan(device), bus.io.node_id
-    plan.need(0x6206, 1, 0xFF, "error mode of outputs")
-    plan.need(0x6207, 1, 0, "error value of outputs")
-    plan.need(0x6443, 1, 1, "error mode of the flow")
-    plan.need(0x6444, 1, 0, "error value of the flow")
+    plan.require(0x6206, 1, 0xFF, "error mode of outputs")
+    plan.require(0x6207, 1, 0, "error value of outputs")
+    plan.require(0x6443, 1, 1, "error mode of the flow")
+    plan.require(0x6444, 1, 0, "error value of the flow")
     _plan_monitoring(plan, bus)
     plan.pdos_off((0x1400, 0x1800))
     plan.pdo(0x1400, 0x1600, RPDO_BASES[0] + node, 255, IO_RPDO)
     _plan_deadline(plan, bus.io.deadline)
-    plan.want(0x1800, 5, _IO_EVENT_MS, "event timer, ms", "sent on change only.")
+    plan.request(0x1800, 5, _IO_EVENT_MS, "event timer, ms", "sent on change only.")
     plan.pdo(0x1800, 0x1A00, TPDO_BASES[0] + node, 255, IO_TPDO)
     return plan
 
 
 def _plan_deadline(plan: ConfigPlan, deadline: float) -> None:
-    """Lets the node notice soon, s, that the master's process data stay away.
+    """Sets the deadline of the RPDO, s, after which the node misses its master.
 
     Source: CiA 301 v4.2.0, 7.5.2.35: the event timer of an RPDO is its deadline, in ms.
     """
     milliseconds = round(deadline * 1e3)
-    own = "a dead master is noticed by its heartbeat alone."
-    plan.want(0x1400, 5, milliseconds, "deadline of the RPDO, ms", own)
+    own = "only the heartbeat shows that the master is dead."
+    plan.request(0x1400, 5, milliseconds, "deadline of the RPDO, ms", own)
 
 
 def _plan_monitoring(plan: ConfigPlan, bus: BusConfig) -> None:
     milliseconds = round(bus.timeouts.heartbeat * 1e3)
     consumer = bus.master_id << 16 | milliseconds
-    own = "the node does not notice a dead master."
-    plan.want(0x1016, 1, consumer, "heartbeat of the master", own)
-    plan.need(0x1017, 0, max(1, milliseconds // 3), "heartbeat")
-    # 1: stays operational, so that the statusword is still seen; 6007h stops the axis.
-    plan.want(0x1029, 1, 1, "error behaviour", "the node may leave OPERATIONAL.")
+    own = "the node does not detect a dead master."
+    plan.request(0x1016, 1, consumer, "heartbeat of the master", own)
+    plan.require(0x1017, 0, max(1, milliseconds // 3), "heartbeat")
+    # 1: stay operational, so that the statusword keeps coming; 6007h stops the axis.
+    plan.request(0x1029, 1, 1, "error behaviour", "the node may leave OPERATIONAL.")
 
 
 def write_and_verify(
@@ -219,8 +228,8 @@ def write_and_verify(
     """Writes a plan, reads back the last value of each object and compares.
 
     Raises:
-        SdoError: An access was refused.
-        BusError: A value read back differs; names object, wanted and found.
+        SdoError: The node aborted an access.
+        BusError: A value reads back differently; names object and both values.
     """
     final: dict[tuple[int, int], Entry] = {}
     for entry in plan.entries:
@@ -244,7 +253,7 @@ def write_and_verify(
         assert isinstance(found, int)
         if (found ^ entry.value) & entry.mask:
             raise BusError(
-                f"{name}: {entry.why} ({entry.index:04X}h:{entry.sub}) was written "
+                f"{name}: {entry.name} ({entry.index:04X}h:{entry.sub}) was written "
                 f"{entry.value} and reads {found}.",
                 code="PNT-BUS-018",
             )

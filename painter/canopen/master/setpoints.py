@@ -1,4 +1,4 @@
-"""Time-stamped setpoints: a buffer with interpolation, and the ramp of a stop."""
+"""Time-stamped setpoints: buffer with interpolation, stop ramp, limit checks."""
 
 import bisect
 import itertools
@@ -12,15 +12,15 @@ from perception.ground import FloatArray
 
 _MOST = 4096
 _STILL = 1e-6
-# A setpoint may be this far outside a joint's range: rounding of a planned path.
+# How far a setpoint may be outside a joint's range, rad: rounding of a planned path.
 _TOLERANCE = 1e-6
-# Share by which a step between two cycles may exceed the joint's greatest speed.
+# Factor by which a step between two cycles may exceed the joint's speed limit.
 _SPEED_MARGIN = 1.05
 
 
 @dataclass(frozen=True)
 class Setpoint:
-    """Where the arm shall be at a time.
+    """Commanded joint state at a time.
 
     Attributes:
         time: Clock of the bus, s.
@@ -37,7 +37,7 @@ class Setpoint:
 
 @dataclass(frozen=True)
 class Sample:
-    """What is commanded now.
+    """Command of one cycle.
 
     Attributes:
         q: (5,) rad.
@@ -53,12 +53,12 @@ class Sample:
 
     @property
     def is_active(self) -> bool:
-        """Whether it moves or sprays, so that the next setpoint must not be late."""
+        """Whether it moves or sprays, so that the next setpoint must be on time."""
         return self.trigger > 0.0 or bool(np.any(np.abs(self.v) > _STILL))
 
 
 class SetpointBuffer:
-    """Setpoints ahead of now; cubic between two (positions and speeds of both)."""
+    """Setpoints ahead of now, with cubic Hermite interpolation between them."""
 
     def __init__(self) -> None:
         """Creates an empty buffer."""
@@ -69,23 +69,23 @@ class SetpointBuffer:
         return len(self._points)
 
     def clear(self) -> None:
-        """Forgets all setpoints."""
+        """Drops all setpoints."""
         self._points = []
 
     def push(self, points: Sequence[Setpoint]) -> None:
-        """Adds setpoints; later ones replace what was planned for the same times.
+        """Adds setpoints; they replace all held ones from their first time on.
 
         Raises:
-            ValueError: They are not in order of time, or not finite.
+            ValueError: Times do not increase, or a value is not finite.
         """
         times = [point.time for point in points]
         if any(b <= a for a, b in itertools.pairwise(times)):
-            raise ValueError("setpoints must be in order of time.")
+            raise ValueError("times of setpoints must increase.")
         for point in points:
             values = np.concatenate([point.q, point.v, [point.time, point.trigger]])
             if values.shape != (12,) or not np.isfinite(values).all():
                 raise ValueError(
-                    f"setpoint at {point.time!r} s is not finite (5,)+(5,)."
+                    f"setpoint at {point.time!r} s must be 5 finite q and 5 finite v."
                 )
             if not 0.0 <= point.trigger <= 1.0:
                 raise ValueError(f"trigger must be 0 to 1, got {point.trigger!r}.")
@@ -94,7 +94,7 @@ class SetpointBuffer:
             self._points = [*self._points[:keep], *points][-_MOST:]
 
     def sample(self, time: float) -> Sample | None:
-        """Returns the command at a time, s; None where none has begun by then."""
+        """Returns the command at a time, s; None before the first setpoint."""
         after = bisect.bisect_right(self._points, time, key=lambda p: p.time)
         if after == 0:
             return None
@@ -105,12 +105,12 @@ class SetpointBuffer:
         return Sample(q, v, first.trigger, 0.0)
 
     def trigger(self, time: float) -> float:
-        """Returns the trigger at a time, s, of the last setpoint that has begun."""
+        """Returns the trigger of the last setpoint before a time, s."""
         after = bisect.bisect_right(self._points, time, key=lambda p: p.time)
         return self._points[after - 1].trigger if after else 0.0
 
     def forget(self, time: float) -> None:
-        """Forgets setpoints that no command from `time`, s, on needs."""
+        """Drops setpoints that no command from `time`, s, on needs."""
         after = bisect.bisect_right(self._points, time, key=lambda p: p.time)
         del self._points[: max(0, after - 1)]
 
@@ -134,7 +134,7 @@ def _cubic(a: Setpoint, b: Setpoint, now: float) -> tuple[FloatArray, FloatArray
 
 
 class StopRamp:
-    """A controlled stop: all joints slow down evenly and stand at the same time."""
+    """A controlled stop: all joints decelerate evenly and stop at the same time."""
 
     def __init__(
         self, now: float, q: FloatArray, v: FloatArray, limits: Sequence[JointLimits]
@@ -142,9 +142,9 @@ class StopRamp:
         """Creates the ramp.
 
         Args:
-            now: When it begins, s.
-            q: (5,) where the arm is commanded to be, rad.
-            v: (5,) how fast, rad/s.
+            now: Start, s.
+            q: (5,) commanded positions at the start, rad.
+            v: (5,) commanded speeds at the start, rad/s.
             limits: Of each joint; `stop` gives the duration.
         """
         self._start, self._q, self._v = now, q.copy(), v.copy()
@@ -154,7 +154,7 @@ class StopRamp:
         self._high = np.array([limit.q_max for limit in limits])
 
     def sample(self, now: float) -> Sample:
-        """Returns the command at `now`, within the joints' ranges."""
+        """Returns the command at `now`, s, within the joints' ranges."""
         t = min(now - self._start, self.duration)
         if self.duration <= 0.0:
             return Sample(self._q, np.zeros(5), 0.0, 0.0)
@@ -164,7 +164,7 @@ class StopRamp:
 
 
 class SetpointGuard:
-    """Says which samples must not be followed."""
+    """Checks samples against the limits of the joints."""
 
     def __init__(self, joints: Sequence[JointLimits], timeout: float) -> None:
         """Creates the guard.
@@ -179,15 +179,15 @@ class SetpointGuard:
         self._v_max = np.array([joint.v_max for joint in joints])
 
     def clip(self, q: FloatArray) -> FloatArray:
-        """Returns positions within the joints' ranges."""
+        """Clips positions to the joints' ranges."""
         return np.clip(q, self._low, self._high)
 
-    def objection(self, sample: Sample, q: FloatArray, elapsed: float) -> str | None:
-        """Returns why a sample must not be followed, or None.
+    def violation(self, sample: Sample, q: FloatArray, elapsed: float) -> str | None:
+        """Returns the limit that a sample violates, or None.
 
         Args:
             sample: The command.
-            q: (5,) command before, rad.
+            q: (5,) previous command, rad.
             elapsed: Time since then, s.
         """
         if sample.lag > self._timeout and sample.is_active:
@@ -199,14 +199,14 @@ class SetpointGuard:
         worst = int(np.argmax(outside))
         if outside[worst] > _TOLERANCE:
             return (
-                f"setpoints: {JOINTS[worst]} {sample.q[worst]:.4f} rad is not in "
-                f"{self._low[worst]:g} to {self._high[worst]:g} rad."
+                f"setpoints: {JOINTS[worst]} must be {self._low[worst]:g} to "
+                f"{self._high[worst]:g} rad, got {sample.q[worst]:.4f} rad."
             )
         speed = np.abs(sample.q - q) / elapsed
         worst = int(np.argmax(speed / self._v_max))
         if speed[worst] > _SPEED_MARGIN * self._v_max[worst]:
             return (
-                f"setpoints: {JOINTS[worst]} would go {speed[worst]:.3f} rad/s, "
-                f"allowed are {self._v_max[worst]:g} rad/s."
+                f"setpoints: speed of {JOINTS[worst]} must be <= "
+                f"{self._v_max[worst]:g} rad/s, got {speed[worst]:.3f} rad/s."
             )
         return None

@@ -1,7 +1,7 @@
-"""The last seconds of what the arm measured, between two processes, without waiting.
+"""The last seconds of measured joint states, shared by processes without locks.
 
-One process writes a row each cycle, others read any stretch of what is still there. A
-reader that was held up for a second finds where the arm was all the while.
+One process writes a row each cycle, others read any stretch that is still held. A
+reader that was delayed by a second still gets all states in between.
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ _ROWS = 2048  # 10 s at 200 Hz.
 
 @dataclass(frozen=True)
 class Samples:
-    """What the arm measured at some SYNCs.
+    """Joint states measured at some SYNCs.
 
     Attributes:
-        time: (n,) s on the bus's clock, when the SYNC was due; increasing.
+        time: (n,) s on the clock of the bus, when the SYNC was due; increasing.
         q: (n, 5) rad.
         v: (n, 5) rad/s.
         trigger: (n,) as commanded to the gun, 0 to 1.
@@ -31,8 +31,14 @@ class Samples:
     v: FloatArray
     trigger: FloatArray
 
+    @classmethod
+    def after(cls, rows: FloatArray, time: float) -> "Samples":
+        """Returns samples after a time, s, of rows (n, 12): time, q, v, trigger."""
+        rows = rows[np.searchsorted(rows[:, 0], time, side="right") :]
+        return cls(rows[:, 0], rows[:, 1:6], rows[:, 6:11], rows[:, 11])
+
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
-        """Returns q and v at a time, s, on straight lines; the ends beyond them.
+        """Returns q and v at a time, s: linear between samples, constant beyond them.
 
         Raises:
             ValueError: There are no samples.
@@ -69,15 +75,15 @@ class SampleRing:
         return self._memory.name
 
     def put(self, time: float, q: FloatArray, v: FloatArray, trigger: float) -> None:
-        """Adds a row; the oldest one goes."""
+        """Adds a row in place of the oldest one."""
         count = int(self._count[0])
         self._rows[count % _ROWS] = np.concatenate([[time], q, v, [trigger]])
         self._count[0] = count + 1
 
     def since(self, time: float) -> Samples:
-        """Returns the rows after a time, s, as far as they are still there."""
+        """Returns the samples after a time, s, that are still held."""
         count = int(self._count[0])
-        # The row that is being written, and one more, are left out.
+        # Leaves out the row that may be written now, and one more.
         first = max(0, count - _ROWS + 2)
         while True:
             rows = self._rows[np.arange(first, count) % _ROWS]
@@ -85,11 +91,10 @@ class SampleRing:
             if overrun <= 0:
                 break
             first += overrun
-        rows = rows[np.searchsorted(rows[:, 0], time, side="right") :]
-        return Samples(rows[:, 0], rows[:, 1:6], rows[:, 6:11], rows[:, 11])
+        return Samples.after(rows, time)
 
     def close(self) -> None:
-        """Lets go; the owner also removes it."""
+        """Closes the memory; the owner also removes it."""
         del self._count, self._rows
         self._memory.close()
         if self._is_owner:

@@ -1,8 +1,8 @@
-"""The one way to a node's objects: a queue of SDO requests that never blocks.
+"""SDO client: a queue of requests to one node's objects that never blocks.
 
-One request of a node is on the bus at a time. `poll` sends, times out and tries again;
-`take` gets the answers. Answers to a request that was given up are told by their index
-and dropped: python-canopen takes a late one for success of the next write.
+One request of a node is on the bus at a time. `poll` sends it, and again after the
+time-out; `take` gets the answers. Late answers to an abandoned request are recognised
+by their index and dropped: python-canopen takes one for success of the next write.
 
 Source: CiA 301 v4.2.0, 7.2.4.3.
 """
@@ -21,8 +21,24 @@ _ABORT = 0x80
 _TIMED_OUT = 0x05040000
 
 
+def address_of(data: bytes) -> tuple[int, int]:
+    """Returns index and sub-index in the eight bytes of a request or answer."""
+    return int.from_bytes(data[1:3], "little"), data[3]
+
+
+def expedited_data(data: bytes) -> bytes:
+    """Returns the value in an expedited download request or upload answer."""
+    size = 4 - (data[0] >> 2 & 3) if data[0] & 0x01 else 4
+    return data[4 : 4 + size]
+
+
+def segment_data(data: bytes) -> bytes:
+    """Returns the part of a value in a segment."""
+    return data[1 : 8 - (data[0] >> 1 & 7)]
+
+
 class SdoError(BusError):
-    """A request was refused or not answered.
+    """The node aborted a request or did not answer it.
 
     Attributes:
         abort_code: SDO abort code.
@@ -34,7 +50,7 @@ class SdoError(BusError):
         self.abort_code = abort_code
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Lets the error cross to another process with both codes."""
+        """Pickles the error with both codes."""
         make = functools.partial(type(self), code=self.code, abort_code=self.abort_code)
         return make, self.args
 
@@ -48,8 +64,8 @@ class SdoRequest:
         sub: Sub-index.
         data: What to write; None to read.
         result: What was read.
-        error: Why it failed.
-        is_done: Whether it has ended.
+        error: Why it failed; None if it did not.
+        is_done: Whether it has been answered or has failed.
     """
 
     index: int
@@ -61,7 +77,11 @@ class SdoRequest:
 
 
 class SdoClient:
-    """Requests to one node."""
+    """SDO client of one node.
+
+    Attributes:
+        retry_count: Requests that were sent again.
+    """
 
     def __init__(
         self,
@@ -78,7 +98,7 @@ class SdoClient:
             name: The node's name, for messages.
             node_id: 1 to 127.
             send: Sends a frame.
-            timeout: Time for an answer, s.
+            timeout: Longest time for an answer, s.
             retries: How often an unanswered request is sent again.
         """
         self._name = name
@@ -95,7 +115,7 @@ class SdoClient:
         self.retry_count = 0
 
     def submit(self, index: int, sub: int, data: bytes | None = None) -> SdoRequest:
-        """Puts a request at the end of the queue.
+        """Appends a request to the queue.
 
         Args:
             index: Object.
@@ -103,7 +123,10 @@ class SdoClient:
             data: One to four bytes to write; None to read.
 
         Returns:
-            The request, which tells when it is done.
+            The request; `is_done` is set later.
+
+        Raises:
+            ValueError: `data` has more than four bytes, or none.
         """
         if data is not None and not 1 <= len(data) <= 4:
             raise ValueError(f"can write 1 to 4 bytes, got {len(data)}.")
@@ -117,7 +140,7 @@ class SdoClient:
         """Submits a request and yields until it is done; returns what was read.
 
         Raises:
-            SdoError: It was refused or not answered.
+            SdoError: The node aborted it or did not answer.
         """
         request = self.submit(index, sub, data)
         while not request.is_done:
@@ -127,7 +150,7 @@ class SdoClient:
         return request.result
 
     def clear(self) -> None:
-        """Drops all requests, such as after the node was reset."""
+        """Fails all requests, e.g. before the node is reset."""
         for request in (self._current, *self._queue):
             if request is not None:
                 self._fail(request, _TIMED_OUT)
@@ -150,7 +173,7 @@ class SdoClient:
             self._start(now)
 
     def take(self, data: bytes, now: float) -> bool:
-        """Takes an answer; returns False for one that answers no request."""
+        """Takes an answer; returns False if it answers no pending request."""
         request = self._current
         if request is None or len(data) != 8:
             return False
@@ -160,17 +183,14 @@ class SdoClient:
 
     def _take_answer(self, request: SdoRequest, data: bytes, now: float) -> bool:
         command = data[0] >> 5
-        is_ours = (int.from_bytes(data[1:3], "little"), data[3]) == (
-            request.index,
-            request.sub,
-        )
+        is_ours = address_of(data) == (request.index, request.sub)
         if command == 4 and is_ours:
             self._fail(request, int.from_bytes(data[4:8], "little"))
             self._current = None
         elif self._is_segmented:
             if command != 0 or data[0] >> 4 & 1 != self._toggle:
                 return False
-            request.result += data[1 : 8 - (data[0] >> 1 & 7)]
+            request.result += segment_data(data)
             self._toggle ^= 1
             if data[0] & 0x01:
                 self._finish(request)
@@ -180,8 +200,7 @@ class SdoClient:
             self._finish(request)
         elif command == 2 and is_ours and request.data is None:
             if data[0] & 0x02:
-                size = 4 - (data[0] >> 2 & 3) if data[0] & 0x01 else 4
-                request.result = data[4 : 4 + size]
+                request.result = expedited_data(data)
                 self._finish(request)
             else:
                 self._is_segmented, self._toggle = True, 0

@@ -1,7 +1,7 @@
 """Master and simulated drives in one thread and in simulated time; a `Bus`.
 
-Nothing waits: time goes on only in `wait_until`. So a whole cycle over CAN frames, and
-every fault in it, repeats exactly.
+Time advances only in `wait_until`. So a whole cycle over CAN frames, and every fault in
+it, repeats exactly.
 """
 
 from collections import deque
@@ -30,7 +30,7 @@ class LockstepBus:
     """
 
     def __init__(self, rack: Rack) -> None:
-        """Puts a master on a rack's wire."""
+        """Connects a master to the wire of a rack."""
         self.rack = rack
         self._bus = rack.bus
         self.master: ArmBus | None = ArmBus(rack.bus, rack.transport)
@@ -44,7 +44,7 @@ class LockstepBus:
         self._alive().start()
 
     def push(self, points: list[Setpoint]) -> None:
-        """Hands setpoints over."""
+        """Hands setpoints to the master."""
         self._alive().push(points)
 
     def stop(self, reason: str) -> None:
@@ -60,22 +60,20 @@ class LockstepBus:
         return Report(self._alive().feedback())
 
     def samples(self, since: float) -> Samples:
-        """Returns what was measured after a time, s."""
-        rows = np.array(self._rows).reshape(-1, 12)
-        rows = rows[np.searchsorted(rows[:, 0], since, side="right") :]
-        return Samples(rows[:, 0], rows[:, 1:6], rows[:, 6:11], rows[:, 11])
+        """Returns the samples after a time, s."""
+        return Samples.after(np.array(self._rows).reshape(-1, 12), since)
 
     def now(self) -> float:
         """Returns the simulated time, s."""
         return self._steps * STEP
 
     def wait_until(self, when: float) -> None:
-        """Lets time pass."""
+        """Advances time to `when`, s."""
         while self._steps * STEP < when - 1e-9:
             self._step()
 
     def kill(self) -> None:
-        """Ends the master as a killed process does: it is called no more."""
+        """Ends the master as killing its process would: nobody steps it any more."""
         self.master = None
 
     def close(self) -> None:

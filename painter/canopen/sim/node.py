@@ -1,9 +1,8 @@
 """A simulated CANopen node: NMT, heartbeats, SYNC, PDOs, SDO server, emergencies.
 
-Source: CiA 301 v4.2.0; clauses are named where they count.
+Source: CiA 301 v4.2.0; clauses are named at their code.
 """
 
-import enum
 from collections.abc import Callable
 
 from painter.canopen.config.device import DeviceDescription
@@ -15,28 +14,12 @@ from painter.canopen.protocol.frames import (
     SYNC_ID,
     Frame,
 )
+from painter.canopen.protocol.nmt import NmtCommand, NmtState
 from painter.canopen.protocol.od_types import Value
 from painter.canopen.sim.pdo import Pdo, PdoEngine
 from painter.canopen.sim.sdo_server import SdoServer
 from painter.canopen.sim.store import ObjectStore
 from painter.canopen.sim.wire import Wire
-
-
-class Nmt(enum.IntEnum):
-    """NMT states as heartbeats say them; clause 7.2.8.3.2.2."""
-
-    INITIALISING = 0
-    STOPPED = 4
-    OPERATIONAL = 5
-    PRE_OPERATIONAL = 127
-
-
-# NMT commands, clause 7.2.8.2.1.
-NMT_START = 1
-NMT_STOP = 2
-NMT_PRE_OPERATIONAL = 128
-NMT_RESET_NODE = 129
-NMT_RESET_COMMUNICATION = 130
 
 HEARTBEAT_LOST = 0x8130
 PDO_LENGTH = 0x8210
@@ -47,18 +30,29 @@ _TICK = 0.001
 
 
 class SimNode:
-    """One node on a wire; drives and I/O nodes add what they do."""
+    """One node on a wire; subclasses are drives and I/O nodes.
+
+    Attributes:
+        node_id: 1 to 127.
+        store: Its objects.
+        pdos: Its process data.
+        sdo: Its SDO server.
+        nmt: Its NMT state.
+        silent: Whether it sends and receives nothing; fault injection.
+        tpdo_silent: Whether it sends no TPDOs; fault injection.
+        now: Time of the last step or frame, s.
+    """
 
     def __init__(
         self, node_id: int, description: DeviceDescription, wire: Wire
     ) -> None:
-        """Creates a node that boots when it is stepped for the first time."""
+        """Creates a node that boots when it is stepped."""
         self.node_id = node_id
         self.store = ObjectStore(description)
         self.pdos = PdoEngine(self.store)
         self.sdo = SdoServer(self.store)
         self.store.written = lambda *written: self.on_write(*written)
-        self.nmt = Nmt.INITIALISING
+        self.nmt = NmtState.INITIALISING
         self.silent = False
         self.tpdo_silent = False
         self.now = 0.0
@@ -69,12 +63,12 @@ class SimNode:
         self._latched: list[tuple[Pdo, bytes]] = []
         self._sync_count = 0
         self._next_event: dict[int, float] = {}
-        # When each RPDO came, and which stay away.
+        # When each RPDO was received last, and which are overdue.
         self._came: dict[int, float] = {}
         self._overdue: set[int] = set()
         self._sent: dict[int, bytes] = {}
 
-    # What children add.
+    # What subclasses override.
 
     def on_boot(self) -> None:
         """The node is initialised."""
@@ -83,16 +77,16 @@ class SimNode:
         """The node was reset; the store has its power-on values."""
 
     def on_sync(self, now: float) -> None:
-        """A SYNC came and synchronous RPDOs are in the store."""
+        """A SYNC was received and synchronous RPDOs are in the store."""
 
     def on_write(self, index: int, sub: int, value: Value) -> None:
         """An RPDO or SDO wrote an object."""
 
     def on_connection_lost(self) -> None:
-        """The master's heartbeat stayed away, or it stopped the node."""
+        """The master's heartbeat or RPDO is overdue, or it stopped the node."""
 
     def refresh(self) -> None:
-        """Values are about to be read: brings the store up to date."""
+        """Values are about to be read: updates the store."""
 
     # The bus.
 
@@ -109,24 +103,24 @@ class SimNode:
         if frame.cob_id == NMT_ID:
             if len(frame.data) == 2 and frame.data[1] in (0, self.node_id):
                 self._nmt_command(frame.data[0])
-        elif self.nmt == Nmt.INITIALISING or self.silent:
+        elif self.nmt == NmtState.INITIALISING or self.silent:
             return
         elif frame.cob_id == SYNC_ID:
             self._sync()
         elif frame.cob_id == SDO_TO_SERVER + self.node_id:
-            if self.nmt != Nmt.STOPPED:
+            if self.nmt != NmtState.STOPPED:
                 self._serve(frame.data)
         elif HEARTBEAT_BASE < frame.cob_id < HEARTBEAT_BASE + 128:
             self._heard[frame.cob_id - HEARTBEAT_BASE] = now
-        elif self.nmt == Nmt.OPERATIONAL:
+        elif self.nmt == NmtState.OPERATIONAL:
             self._take_rpdo(frame)
 
     def step(self, now: float) -> None:
-        """Lets time pass: boot, heartbeats, event timers."""
+        """Advances to `now`: boot, heartbeats, event timers."""
         self.now = max(self.now, now)
-        if self.nmt == Nmt.INITIALISING:
+        if self.nmt == NmtState.INITIALISING:
             if self.now >= self._boot_at:
-                self.nmt = Nmt.PRE_OPERATIONAL
+                self.nmt = NmtState.PRE_OPERATIONAL
                 self.on_boot()
                 self.send(HEARTBEAT_BASE + self.node_id, b"\0")
                 self._next_heartbeat = self.now
@@ -136,16 +130,16 @@ class SimNode:
             self._next_heartbeat = self.now + period
             self.send(HEARTBEAT_BASE + self.node_id, bytes([self.nmt]))
         self._watch_heartbeats()
-        if self.nmt == Nmt.OPERATIONAL:
+        if self.nmt == NmtState.OPERATIONAL:
             self._watch_rpdos()
             self._send_events()
 
     def reboot(self) -> None:
-        """Resets the node, as power loss would."""
-        self._nmt_command(NMT_RESET_NODE)
+        """Resets the node, as a power cycle would."""
+        self._nmt_command(NmtCommand.RESET_NODE)
 
     def emergency(self, code: int, register: int) -> None:
-        """Sends an EMCY and keeps it in 1001h, 1003h and 603Fh; code 0 is the end."""
+        """Sends an EMCY and stores it in 1001h and 1003h; code 0 ends the error."""
         self.store.set(0x1001, 0, register)
         if code:
             count = min(self.store.number(0x1003) + 1, 8)
@@ -157,27 +151,27 @@ class SimNode:
         self.send(0x80 + self.node_id, data)
 
     def _nmt_command(self, command: int) -> None:
-        if command in (NMT_RESET_NODE, NMT_RESET_COMMUNICATION):
-            only = command == NMT_RESET_COMMUNICATION
+        if command in (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION):
+            only = command == NmtCommand.RESET_COMMUNICATION
             self.store.power_on(communication_only=only)
             self.pdos.invalidate()
             self.sdo.reset()
             self._heard, self._latched, self._sent = {}, [], {}
             self._came, self._overdue = {}, set()
-            self.nmt = Nmt.INITIALISING
+            self.nmt = NmtState.INITIALISING
             self._boot_at = self.now + BOOT_TIME
             if not only:
                 self.on_reset()
             return
-        states = {
-            NMT_START: Nmt.OPERATIONAL,
-            NMT_STOP: Nmt.STOPPED,
-            NMT_PRE_OPERATIONAL: Nmt.PRE_OPERATIONAL,
+        states: dict[int, NmtState] = {
+            NmtCommand.START: NmtState.OPERATIONAL,
+            NmtCommand.STOP: NmtState.STOPPED,
+            NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
         }
-        if self.nmt == Nmt.INITIALISING or command not in states:
+        if self.nmt == NmtState.INITIALISING or command not in states:
             return
         was, self.nmt = self.nmt, states[command]
-        if was == Nmt.OPERATIONAL != self.nmt:
+        if was == NmtState.OPERATIONAL != self.nmt:
             self.on_connection_lost()
 
     def _serve(self, request: bytes) -> None:
@@ -209,7 +203,7 @@ class SimNode:
 
     def _sync(self) -> None:
         self._sync_count += 1
-        if self.nmt != Nmt.OPERATIONAL:
+        if self.nmt != NmtState.OPERATIONAL:
             return
         latched, self._latched = self._latched, []
         for pdo, data in latched:
@@ -259,7 +253,10 @@ class SimNode:
                 del self._heard[producer]
                 self.emergency(HEARTBEAT_LOST, 0x11)
                 self.on_connection_lost()
-                if self.store.number(0x1029, 1) == 0 and self.nmt == Nmt.OPERATIONAL:
-                    self.nmt = Nmt.PRE_OPERATIONAL
+                if (
+                    self.store.number(0x1029, 1) == 0
+                    and self.nmt == NmtState.OPERATIONAL
+                ):
+                    self.nmt = NmtState.PRE_OPERATIONAL
                 elif self.store.number(0x1029, 1) == 2:
-                    self.nmt = Nmt.STOPPED
+                    self.nmt = NmtState.STOPPED

@@ -9,11 +9,12 @@ import numpy as np
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.units import AXES
 from painter.canopen.protocol.frames import ERROR_BUS_OFF, Frame
+from painter.canopen.protocol.nmt import NmtState
 from painter.canopen.sim.drive import SimDrive
 from painter.canopen.sim.io_node import SimIo
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.motor import LoadedMotor
-from painter.canopen.sim.node import Nmt, SimNode
+from painter.canopen.sim.node import SimNode
 from painter.canopen.sim.wire import Wire
 from painter.canopen.wire.transports import TransportError
 
@@ -90,7 +91,7 @@ class Rack:
             (
                 drive.period
                 for drive in self.drives.values()
-                if drive.nmt == Nmt.OPERATIONAL
+                if drive.nmt == NmtState.OPERATIONAL
             ),
             default=0.0,
         )
@@ -149,7 +150,7 @@ class Rack:
         elif fault == Fault.TPDO_SILENT:
             drive.tpdo_silent = True
         elif fault == Fault.SDO_ABORT:
-            drive.sdo.refused[0x607D, 1] = 0x08000022
+            drive.sdo.aborts[0x607D, 1] = 0x08000022
         elif fault == Fault.WRONG_IDENTITY:
             drive.store.fix(0x1018, 2, 0xBAD)
         elif fault == Fault.WRONG_UNIT:
@@ -170,7 +171,7 @@ class Rack:
         for name, drive in self.drives.items():
             drive.motor.is_blocked = drive.silent = drive.tpdo_silent = False
             drive.brake_stuck = False
-            drive.sdo.refused.clear()
+            drive.sdo.aborts.clear()
             identity = self.bus.drives[name].identity
             drive.store.fix(0x1018, 2, identity.product)
             drive.store.fix(0x608F, 1, round(self.bus.drives[name].counts_per_turn))

@@ -1,8 +1,9 @@
 """The SDO server of a simulated node: expedited and segmented transfers.
 
-Source: CiA 301 v4.2.0, 7.2.4.3. Block transfer, an option there, is refused.
+Source: CiA 301 v4.2.0, 7.2.4.3. Block transfer, optional there, is rejected.
 """
 
+from painter.canopen.protocol.sdo import address_of, expedited_data, segment_data
 from painter.canopen.sim.store import ObjectStore, SdoAbortError
 
 _UNKNOWN_COMMAND = 0x05040001
@@ -12,7 +13,11 @@ _MOST_BYTES = 4096
 
 
 class SdoServer:
-    """Answers one client."""
+    """Answers one client.
+
+    Attributes:
+        aborts: Abort codes of accesses to fail, by (index, sub); fault injection.
+    """
 
     def __init__(self, store: ObjectStore) -> None:
         """Creates the server of a store."""
@@ -21,16 +26,15 @@ class SdoServer:
         self._upload: bytes | None = None
         self._download: bytes | None = None
         self._toggle = 0
-        # Accesses to be refused: (index, sub) to abort code; fault injection.
-        self.refused: dict[tuple[int, int], int] = {}
+        self.aborts: dict[tuple[int, int], int] = {}
 
     def reset(self) -> None:
-        """Forgets a transfer that was under way."""
+        """Drops a transfer that is under way."""
         self._upload = self._download = None
         self._toggle = 0
 
     def answer(self, request: bytes) -> bytes | None:
-        """Returns the answer to a request of eight bytes; None if it asks for none."""
+        """Returns the answer to a request of eight bytes; None if it needs none."""
         if len(request) != 8:
             return None
         command = request[0] >> 5
@@ -38,7 +42,7 @@ class SdoServer:
             self.reset()
             return None
         if command in (1, 2):
-            self._key = (int.from_bytes(request[1:3], "little"), request[3])
+            self._key = address_of(request)
         try:
             if command == 1:
                 return self._start_download(request)
@@ -57,20 +61,17 @@ class SdoServer:
         index, sub = self._key
         return bytes([command]) + index.to_bytes(2, "little") + bytes([sub])
 
-    def _check_refused(self) -> None:
-        if self._key in self.refused:
-            raise SdoAbortError(self.refused[self._key])
+    def _check_injected(self) -> None:
+        if self._key in self.aborts:
+            raise SdoAbortError(self.aborts[self._key])
 
     def _start_download(self, request: bytes) -> bytes:
         self.reset()
-        self._check_refused()
+        self._check_injected()
         if request[0] & 0x02:
-            size = 4 - (request[0] >> 2 & 3) if request[0] & 0x01 else 4
-            self._store.write(*self._key, request[4 : 4 + size])
+            self._store.write(*self._key, expedited_data(request))
         else:
-            info = self._store.find(*self._key)
-            if info.access not in ("rw", "wo"):
-                raise SdoAbortError(0x06010002)
+            self._store.find_writable(*self._key)
             self._download = b""
         return self._head(0x60) + bytes(4)
 
@@ -78,8 +79,7 @@ class SdoServer:
         if self._download is None:
             raise SdoAbortError(_UNKNOWN_COMMAND)
         self._check_toggle(request)
-        used = 7 - (request[0] >> 1 & 7)
-        self._download += request[1 : 1 + used]
+        self._download += segment_data(request)
         if len(self._download) > _MOST_BYTES:
             raise SdoAbortError(_TOO_LONG)
         answer = bytes([0x20 | (request[0] & 0x10)]) + bytes(7)
@@ -90,7 +90,7 @@ class SdoServer:
 
     def _start_upload(self) -> bytes:
         self.reset()
-        self._check_refused()
+        self._check_injected()
         data = self._store.read(*self._key)
         if 1 <= len(data) <= 4:
             command = 0x43 | (4 - len(data)) << 2

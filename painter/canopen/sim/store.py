@@ -13,7 +13,7 @@ Hook = Callable[[int, Value], None]
 
 
 class SdoAbortError(Exception):
-    """An access is refused with an abort code; see codes.SDO_ABORTS."""
+    """A node aborts an access; `code` is one of codes.SDO_ABORTS."""
 
     def __init__(self, code: int) -> None:
         """Creates it."""
@@ -34,13 +34,13 @@ class ObjectStore:
             self._defaults[key] = fallback if info.default is None else info.default
         self._saved: dict[tuple[int, int], Value] = {}
         self.values = dict(self._defaults)
-        # Called after the checks and before the value is kept; may refuse.
+        # Called after the checks, before the value is stored; may raise SdoAbortError.
         self.hooks: dict[int, Hook] = {}
         # Called with index, sub and value after a client's write.
         self.written: Callable[[int, int, Value], None] | None = None
 
     def power_on(self, *, communication_only: bool = False) -> None:
-        """Takes the values that count after a reset: saved ones, else defaults."""
+        """Loads the values after a reset: saved ones, else defaults."""
         for key, value in (self._defaults | self._saved).items():
             if not communication_only or 0x1000 <= key[0] < 0x2000:
                 self.values[key] = value
@@ -63,13 +63,24 @@ class ObjectStore:
             raise SdoAbortError(code)
         return info
 
+    def find_writable(self, index: int, sub: int) -> ObjectInfo:
+        """Returns an entry that a client may write.
+
+        Raises:
+            SdoAbortError: There is no such entry, or it is read only.
+        """
+        info = self.find(index, sub)
+        if info.access not in ("rw", "wo"):
+            raise SdoAbortError(0x06010002)
+        return info
+
     def number(self, index: int, sub: int = 0, otherwise: int = 0) -> int:
-        """Returns an integer value; `otherwise` where the node has no such object."""
+        """Returns an integer value; `otherwise` if the node has no such object."""
         value = self.values.get((index, sub), otherwise)
         return int(value) if isinstance(value, int | float) else otherwise
 
     def set(self, index: int, sub: int, value: Value) -> None:
-        """Sets a value from inside the node; nothing where there is no such object."""
+        """Sets a value from inside the node; ignores an object that it lacks."""
         if (index, sub) in self.values:
             self.values[index, sub] = value
 
@@ -88,12 +99,10 @@ class ObjectStore:
         """Takes a value from an SDO client.
 
         Raises:
-            SdoAbortError: The object is missing or read only, or length or value is
-                out of its bounds, or the node refuses it in its present state.
+            SdoAbortError: The object is missing or read only, length or value is out of
+                its bounds, or the state of the node forbids the write.
         """
-        info = self.find(index, sub)
-        if info.access not in ("rw", "wo"):
-            raise SdoAbortError(0x06010002)
+        info = self.find_writable(index, sub)
         size = size_of(info.data_type)
         if size is not None and len(data) != size:
             raise SdoAbortError(0x06070012 if len(data) > size else 0x06070013)
@@ -116,7 +125,7 @@ class ObjectStore:
     def _check_bounds(info: ObjectInfo, value: Value) -> None:
         if isinstance(value, bytes):
             return
-        # Some files give 0 for both bounds of what can well be set (6066h of EPOS4).
+        # Some files give 0 for both bounds of writable objects (6066h of EPOS4).
         if info.low == info.high and info.index != 0x1003:
             return
         if isinstance(info.high, int) and value > info.high:
@@ -135,7 +144,7 @@ class ObjectStore:
         }
 
     def _restore(self, value: Value) -> None:
-        """Forgets what was saved; as in CiA 301, the next reset takes the defaults."""
+        """Drops saved values; the next reset loads the defaults, as in CiA 301."""
         if value != LOAD:
             raise SdoAbortError(0x08000020)
         self._saved = {}

@@ -89,5 +89,5 @@ def test_what_stopped_the_arm_is_named(recorded, fault, words):
 
 
 def test_a_log_without_motion_is_refused(make_lab):
-    with pytest.raises(InputError, match="no time at which all drives are enabled"):
+    with pytest.raises(InputError, match="at no time in the log are all drives"):
         LogBus(make_lab().bus, [LogRecord(0.1, Frame(SYNC_ID))] * 2)

@@ -77,7 +77,7 @@ def test_rpm_drives_get_rpm(makers):
 def test_what_a_drive_cannot_be_told_is_said(makers):
     notes = {d.name: " ".join(d.plan.notes) for d in makers.master.drives}
     assert "607Fh" in notes["elbow_pitch"]
-    assert "only the host limits it" in notes["elbow_pitch"]
+    assert "only the host enforces this limit" in notes["elbow_pitch"]
     assert "605Ah (quick stop option)" in notes["shoulder_pitch"]
     assert "6007h (abort connection option)" in notes["shoulder_pitch"]
     assert "6066h (following error time) is fixed to 0" in notes["base_yaw"]

@@ -201,8 +201,8 @@ def test_setpoints_may_end_at_rest(lab):
 @pytest.mark.parametrize(
     ("joint", "value", "reason"),
     [
-        (3, 1.7, "wrist_pitch 1.7000 rad is not in -2.75 to 1.6 rad"),
-        (0, 0.5, "base_yaw would go 100.000 rad/s, allowed are 2 rad/s"),
+        (3, 1.7, "wrist_pitch must be -2.75 to 1.6 rad, got 1.7000 rad"),
+        (0, 0.5, "speed of base_yaw must be <= 2 rad/s, got 100.000 rad/s"),
     ],
 )
 def test_a_setpoint_out_of_bounds_is_not_followed(lab, joint, value, reason):

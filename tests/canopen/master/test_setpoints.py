@@ -60,11 +60,11 @@ def test_the_trigger_holds_until_the_next_setpoint():
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        ([point(1.0, 0.0), point(1.0, 0.0)], "in order of time"),
-        ([point(1.0, np.nan)], "not finite"),
-        ([point(np.inf, 0.0)], "not finite"),
+        ([point(1.0, 0.0), point(1.0, 0.0)], "must increase"),
+        ([point(1.0, np.nan)], "must be 5 finite"),
+        ([point(np.inf, 0.0)], "must be 5 finite"),
         ([point(1.0, 0.0, trigger=1.5)], "trigger must be 0 to 1"),
-        ([Setpoint(1.0, np.zeros(4), np.zeros(5))], "not finite"),
+        ([Setpoint(1.0, np.zeros(4), np.zeros(5))], "must be 5 finite"),
     ],
 )
 def test_unusable_setpoints_are_refused(points, message):
@@ -91,6 +91,6 @@ def test_a_stop_stays_in_the_joints_ranges():
 def test_the_guard_allows_the_greatest_speed_and_no_more():
     dut = SetpointGuard(LIMITS, timeout=0.05)
     ok = Sample(np.full(5, 0.01), np.full(5, 2.0), 0.0, 0.0)
-    assert dut.objection(ok, np.zeros(5), 0.005) is None
+    assert dut.violation(ok, np.zeros(5), 0.005) is None
     fast = Sample(np.full(5, 0.0115), np.full(5, 2.0), 0.0, 0.0)
-    assert "2.300 rad/s" in dut.objection(fast, np.zeros(5), 0.005)
+    assert "2.300 rad/s" in dut.violation(fast, np.zeros(5), 0.005)

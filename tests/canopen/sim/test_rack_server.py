@@ -8,7 +8,7 @@ import pytest
 from painter import timebase
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.protocol.frames import SYNC_ID, Frame
-from painter.canopen.sim.node import Nmt
+from painter.canopen.protocol.nmt import NmtState
 from painter.canopen.sim.server import RackServer
 from painter.resources import models_path
 
@@ -41,7 +41,7 @@ class Bench:
         """Drives are told when SYNCs come, and made operational."""
         for drive in self.server.rack.drives.values():
             drive.store.fix(0x60C2, 1, milliseconds)
-            drive.nmt = Nmt.OPERATIONAL
+            drive.nmt = NmtState.OPERATIONAL
 
     def receive(self, timeout):
         batch, self.batch = self.batch, []
@@ -86,7 +86,7 @@ def test_the_cycle_is_what_the_drives_were_told_whatever_their_bus_file_says(ben
 
 def test_time_waits_for_no_sync_before_a_drive_is_operational(bench):
     for drive in bench.server.rack.drives.values():
-        drive.nmt = Nmt.PRE_OPERATIONAL
+        drive.nmt = NmtState.PRE_OPERATIONAL
     bench.until(100.005)
     bench.batch = [SYNC]
     bench.until(100.040)
