@@ -14,7 +14,7 @@ class InputError(PainterError):
 
 
 class PortTypeError(PainterError):
-    """A port carries a value of another Python type than its reader expects."""
+    """A system lacks a port, or a port carries another type than expected."""
 
 
 class ReachError(PainterError):

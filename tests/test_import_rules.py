@@ -26,6 +26,7 @@ PLANNING_VALUES = {
     "painter.planning.zones",
 }
 SYSTEM_VALUES = {
+    "painter.systems.cycle_state",
     "painter.systems.ports",
     "painter.systems.stage",
     "painter.systems.values",
@@ -214,7 +215,7 @@ ROOMS: dict[str, set[str]] = {
         "painter.scene",
     },
     "painter.systems": SYSTEM_VALUES
-    | {"painter.errors", "painter.planning", "perception.errors"},
+    | {"painter.errors", "painter.planning", "perception.errors", "perception.values"},
     "painter.systems.brain": SYSTEM_VALUES
     | {"painter.errors", "painter.planning", "perception"},
     "painter.systems.simulated": SYSTEM_VALUES

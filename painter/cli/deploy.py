@@ -190,7 +190,7 @@ def deploy(
                 now: float, status: CycleStatus, follower: FollowerStatus
             ) -> str | None:
                 tell(now, status, follower)
-                return operator.word(status.phase)
+                return operator.command(status.phase)
 
             left = DeployCycle(
                 job, connection, remainder=remainder, watch=watch, interruption=stopper
@@ -199,18 +199,16 @@ def deploy(
             tell(left.end_time, left.status, FollowerStatus())
             _log_health(folder, left.end_time, process, reader)
         except PainterError as error:
-            folder.mark_incomplete(f"{Phase.FAULT.value}: {error}")
+            folder.mark_incomplete(f"{Phase.FAULT.value}: {error}", error.code)
             raise
     result, cause = left.status.phase, left.status.cause or None
-    if stopper() is not None and result != Phase.DONE:
-        result, cause = Phase.ABORTED, INTERRUPTED
-        folder.log(left.end_time, "phase", phase=result.value)
     write_log(folder, job, left)
     figures = finish_run(
         folder,
         time=left.end_time,
         result=result.value,
         cause=cause,
+        code=left.status.code or None,
         wall_clock=time.perf_counter() - start,
     )
     if as_json:
@@ -218,7 +216,7 @@ def deploy(
     else:
         print_summary(figures, out)
     if result != Phase.DONE:
-        raise FaultError(f"{result.value}: {cause}", code="PNT-USE-018")
+        raise FaultError(f"{result.value}: {cause}", code=left.status.code)
 
 
 def rehearsed(bus: BusConfig) -> BusConfig:

@@ -21,7 +21,8 @@ from painter.cli.common import (
 )
 from painter.config import dump_scenario, load_scenario
 from painter.cycle.earlier_run import EarlierRun
-from painter.cycle.simulate import SimulateCycle, Watch
+from painter.cycle.running_cycle import Watch
+from painter.cycle.simulate import SimulateCycle
 from painter.cycle.write_run import event_watch, write_log
 from painter.errors import FaultError, InputError
 from painter.planning.strokes.spray_settings import SpraySettings
@@ -135,6 +136,7 @@ def simulate(
         time=log.end_time,
         result=log.status.phase.value,
         cause=log.status.cause or None,
+        code=log.status.code or None,
         wall_clock=time.perf_counter() - start,
     )
     if as_json:
@@ -143,7 +145,7 @@ def simulate(
         print_summary(figures, out)
     if log.status.phase != Phase.DONE:
         raise FaultError(
-            f"{log.status.phase.value}: {log.status.cause}", code="PNT-USE-050"
+            f"{log.status.phase.value}: {log.status.cause}", code=log.status.code
         )
 
 

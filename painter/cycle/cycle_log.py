@@ -1,6 +1,5 @@
-"""What one paint cycle leaves, on either body."""
+"""The log of one paint cycle, on either body."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,23 +10,14 @@ from painter.planning.spray_path import PaintProgram
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import (
     CycleStatus,
-    FollowerStatus,
 )
 from perception.ground import FloatArray, FrozenValue
 from perception.values import SurfaceMap, WallSegmentation
 
-LOG_PERIOD = 0.01
-CLEARANCE_PERIOD = 0.05
-# Robot time between looks at the cycle from outside, s.
-WATCH_PERIOD = 0.1
-
-# Sees the robot's time, s, and both statuses; may return a word of the operator's.
-Watch = Callable[[float, CycleStatus, FollowerStatus], str | None]
-
 
 @dataclass(frozen=True, eq=False)
 class CycleLog(FrozenValue):
-    """What a cycle leaves; parts it did not come to are None.
+    """The log of a cycle; results that it did not reach are None.
 
     Attributes:
         status: The cycle's last status, with all events.
@@ -36,16 +26,16 @@ class CycleLog(FrozenValue):
         q: (n, 5) rad, measured.
         v: (n, 5) rad/s, measured.
         trigger: (n,) as the gun received it.
-        X_WG: (n, 4, 4) nozzle poses in W: true ones, or measured where nobody knows.
+        X_WG: (n, 4, 4) nozzle poses in W: true, or measured if unknown.
         X_WG_desired: (n, 4, 4) nozzle poses of the desired joint state.
-        clearance_time: (k,) s; nothing where nobody knows clearances.
+        clearance_time: (k,) s; empty where clearances are unknown.
         clearance: (k,) m, least distance of the robot from the scene.
         floor_clearance: (k,) m, the same from the floor and the robot's own frame.
         surface_map: The fused map.
         segmentation: The wall's segmentation, or None.
         program: The paint program, or None.
-        film: The paint film at the end; None where nobody knows it.
-        look_image: (H, W, 4) uint8, colour picture of first sight, or None.
+        film: The paint film at the end; None where it is unknown.
+        look_image: (H, W, 4) uint8, first colour picture of the wall, or None.
     """
 
     status: CycleStatus

@@ -4,24 +4,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
 
 from painter.camera.reader import Reading
 from painter.canopen.analysis.log_bus import LogBus
 from painter.canopen.process.robot_clock import RobotClock
 from painter.config import Scenario
+from painter.cycle.cycle_log import GunPoses
 from painter.diagrams.hardware_station import MakeHardwareStation, RobotConnection
 from painter.planning.arm.kinematics import NQ
 from painter.robot.robot_model import MakeRobotModel
 from painter.systems.ports import EvalAs
-from painter.systems.simulated.gun_pose import GunPose
 from painter.systems.values import ArmStatus
 from perception.ground import FloatArray
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What a diagram saw of a log.
+    """What the station saw of a log.
 
     Attributes:
         time: (n,) s, from when the drives were first enabled.
@@ -30,7 +29,7 @@ class Replay:
         trigger: (n,) 0 to 1, as commanded to the gun.
         X_WG: (n, 4, 4) pose of the gun.
         X_WG_desired: (n, 4, 4) pose commanded at the same times.
-        stops: When the station's status named a new reason to stop, s, and the reason.
+        stops: Time, s, and cause of each new stop in the station's status.
     """
 
     time: FloatArray
@@ -53,51 +52,37 @@ def ReplayLog(scenario: Scenario, bus: LogBus, cycle: float) -> Replay:
     clock = RobotClock()
     clock.start(bus.begin)
     connection = RobotConnection(bus=bus, clock=clock, cycle=cycle, read_camera=Reading)
-    kinematics = MakeRobotModel(scenario).kinematics
-    builder = DiagramBuilder()
-    station = builder.AddSystem(MakeHardwareStation(scenario, connection))
-    gun = builder.AddNamedSystem("gun_pose", GunPose(kinematics=kinematics))
-    state_port = station.GetOutputPort("arm.state_estimated")
-    builder.Connect(state_port, gun.GetInputPort("state"))
-    for name in ("arm.desired_state", "gun.trigger"):
-        builder.ExportInput(station.GetInputPort(name), name)
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
+    station = MakeHardwareStation(scenario, connection)
+    simulator = Simulator(station)
     context = simulator.get_mutable_context()
-    diagram.GetInputPort("arm.desired_state").FixValue(context, np.zeros(2 * NQ))
-    diagram.GetInputPort("gun.trigger").FixValue(context, [0.0])
-    station_context = station.GetMyContextFromRoot(context)
-    pose_port, gun_context = (
-        gun.GetOutputPort("X_WG"),
-        gun.GetMyContextFromRoot(context),
-    )
+    station.GetInputPort("arm.desired_state").FixValue(context, np.zeros(2 * NQ))
+    station.GetInputPort("gun.trigger").FixValue(context, [0.0])
+    state_port = station.GetOutputPort("arm.state_estimated")
     status_port = station.GetOutputPort("arm.status")
-    rows, stops, reason = [], [], ""
+    rows: list[tuple[float, FloatArray, float, FloatArray]] = []
+    stops: list[tuple[float, str]] = []
+    reason = ""
     for time in np.arange(0.0, bus.end - bus.begin + 0.5 * cycle, cycle):
         bus.wait_until(clock.bus_time(time))
         simulator.AdvanceTo(time)
         simulator.AdvancePendingEvents()
+        stopped = EvalAs(status_port, context, ArmStatus).stopped
+        if stopped is not None and stopped.cause != reason:
+            stops.append((float(time), stopped.cause))
+        reason = "" if stopped is None else stopped.cause
         feedback = bus.report().feedback
-        status = EvalAs(status_port, station_context, ArmStatus)
-        if status.stopped != reason:
-            reason = status.stopped
-            if reason:
-                stops.append((float(time), reason))
-        state = state_port.Eval(station_context)
-        X_WG = pose_port.Eval(gun_context).GetAsMatrix4()
-        rows.append((time, state, feedback.trigger, X_WG, feedback.q_commanded))
-    times, states, triggers, poses, commanded = (
+        state = state_port.Eval(context).copy()
+        rows.append((time, state, feedback.trigger, feedback.q_commanded))
+    times, states, triggers, commanded = (
         np.array(column) for column in zip(*rows, strict=True)
     )
-    R_WG, p_WG = kinematics.gun_poses(commanded)
-    desired = np.tile(np.eye(4), (times.size, 1, 1))
-    desired[:, :3, :3], desired[:, :3, 3] = R_WG, p_WG
+    kinematics = MakeRobotModel(scenario).kinematics
     return Replay(
         time=times,
         q=states[:, :NQ],
         v=states[:, NQ:],
         trigger=triggers,
-        X_WG=poses,
-        X_WG_desired=desired,
+        X_WG=GunPoses(kinematics, states[:, :NQ]),
+        X_WG_desired=GunPoses(kinematics, commanded),
         stops=tuple(stops),
     )

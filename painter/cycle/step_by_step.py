@@ -1,4 +1,4 @@
-"""The operator at the terminal: a word before each phase, or before painting."""
+"""The operator at the terminal, asked before each phase or before painting."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ _ENDS = (Phase.DONE, Phase.FAULT, Phase.ABORTED)
 
 
 class StepByStep:
-    """Turns what the operator says into words for the brain."""
+    """Turns the operator's answers into commands for the cycle."""
 
     def __init__(
         self, *, every_phase: bool, review: bool, ask: Callable[[str], bool]
@@ -16,9 +16,9 @@ class StepByStep:
         """Creates it.
 
         Args:
-            every_phase: Whether each phase waits for a word.
-            review: Whether the program is to be approved before it is painted.
-            ask: Asks the operator and waits; False aborts.
+            every_phase: Whether each phase needs the operator's consent.
+            review: Whether the program needs approval before it is painted.
+            ask: Asks the operator and waits for the answer; False aborts.
         """
         self._every_phase = every_phase
         self._review = review
@@ -26,13 +26,13 @@ class StepByStep:
         self._allowed: Phase | None = None
         self._waiting: Phase | None = None
 
-    def word(self, phase: Phase) -> str | None:
-        """Returns the operator's word, if one is due; to be called often.
+    def command(self, phase: Phase) -> str | None:
+        """Returns the operator's command, if one is due; to be called often.
 
-        The arm is paused first, and the question comes when it stands.
+        The arm is paused first; the operator is asked when it stands.
 
         Args:
-            phase: Of the cycle now.
+            phase: Present phase of the cycle.
         """
         if phase == Phase.REVIEW and self._review and self._allowed != phase:
             self._allowed = phase
@@ -41,11 +41,8 @@ class StepByStep:
             return None
         if phase == Phase.PAUSED and self._waiting is not None:
             self._allowed, self._waiting = self._waiting, None
-            return (
-                "resume"
-                if self._ask(f"Go on with {self._allowed.value}?")
-                else ("abort")
-            )
+            question = f"Continue with {self._allowed.value}?"
+            return "resume" if self._ask(question) else "abort"
         if phase not in (self._allowed, Phase.PAUSED, Phase.REVIEW, self._waiting):
             self._waiting = phase
             return "pause"

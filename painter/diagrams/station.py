@@ -1,27 +1,31 @@
-"""The station: what the brain sees of a connection, whichever body it is."""
+"""The station: the ports between brain and robot, the same on both bodies."""
 
 from typing import TYPE_CHECKING
 
 from pydrake.geometry import Meshcat
 from pydrake.systems.framework import Diagram
+from pydrake.systems.sensors import ImageDepth16U, ImageRgba8U
 
 from painter.config import Scenario
 from painter.diagrams.sim_station import MakeSimStation
+from painter.planning.arm.kinematics import NQ
+from painter.systems.ports import CheckPorts
 from painter.systems.simulated.paint_film import FilmState
+from painter.systems.values import ArmStatus
 
 if TYPE_CHECKING:  # Simulation runs without the robot's packages.
     from painter.diagrams.hardware_station import RobotConnection
 
-STATION_INPUTS = frozenset({"arm.desired_state", "gun.trigger"})
-STATION_OUTPUTS = frozenset(
-    {
-        "arm.state_estimated",
-        "arm.status",
-        "wall_camera.color_image",
-        "wall_camera.depth_image",
-        "wall_camera.image_time",
-    }
-)
+STATION_INPUTS = {"arm.desired_state": 2 * NQ, "gun.trigger": 1}
+STATION_OUTPUTS = {
+    "arm.state_estimated": 2 * NQ,
+    "arm.status": ArmStatus(),
+    "wall_camera.color_image": ImageRgba8U(),
+    "wall_camera.depth_image": ImageDepth16U(),
+    "wall_camera.image_time": 1,
+}
+# The outputs that the brain reads; the colour picture is for the report.
+STATION_TO_BRAIN = tuple(sorted(STATION_OUTPUTS.keys() - {"wall_camera.color_image"}))
 CHEAT_PREFIX = "cheat."
 
 
@@ -32,12 +36,12 @@ def MakeStation(
     film: FilmState | None = None,
     meshcat: Meshcat | None = None,
 ) -> Diagram:
-    """Makes the simulated station or, given a connected `body`, the robot's.
+    """Makes the simulated station or, given a `connection`, the robot's.
 
     Args:
-        scenario: What stands in front of which robot.
-        connection: What the robot's station is connected to; None = a simulated one.
-        film: What is on the wall already; simulation only. None = nothing.
+        scenario: Robot, scene and settings.
+        connection: The robot to connect to; None = a simulated one.
+        film: Film that is on the wall already; simulation only. None = none.
         meshcat: Where to show it; simulation only. None = nowhere.
 
     Returns:
@@ -52,25 +56,12 @@ def MakeStation(
         from painter.diagrams.hardware_station import MakeHardwareStation
 
         station = MakeHardwareStation(scenario, connection)
-    CheckPorts(station)
+    CheckStation(station)
     return station
 
 
-def CheckPorts(station: Diagram) -> None:
-    """Raises ValueError if a station's ports are not those of the contract."""
-    inputs = {
-        station.get_input_port(i).get_name() for i in range(station.num_input_ports())
-    }
-    outputs = {
-        station.get_output_port(i).get_name() for i in range(station.num_output_ports())
-    }
-    public = {name for name in outputs if not name.startswith(CHEAT_PREFIX)}
-    for kind, found, expected in (
-        ("inputs", inputs, STATION_INPUTS),
-        ("outputs", public, STATION_OUTPUTS),
-    ):
-        if found != expected:
-            raise ValueError(
-                f"station {kind}: missing {sorted(expected - found)}, "
-                f"not in the contract {sorted(found - expected)}."
-            )
+def CheckStation(station: Diagram) -> None:
+    """Raises PortTypeError if a station's ports are not those of the contract."""
+    CheckPorts(
+        "station", station, STATION_INPUTS, STATION_OUTPUTS, ignored=CHEAT_PREFIX
+    )

@@ -1,26 +1,67 @@
-"""A stage of the paint cycle: works when asked and keeps its answer."""
+"""A stage of the paint cycle: does one piece of work on request and keeps the answer.
+
+To exchange a stage, derive from `Stage` or write any LeafSystem with the same ports;
+see docs/own-stage.md.
+"""
 
 import time
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from painter.errors import PainterError
-from painter.systems.ports import EvalAs
+from painter.planning.arm.kinematics import NQ
+from painter.planning.spray_path import Motion, PaintProgram
+from painter.systems.ports import DeclareInputs, EvalAs, Ports
 from painter.systems.values import StageRequest, StageResult
 from perception.errors import PerceptionError
+from perception.values import SurfaceMap, Wall, WallSegmentation
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class StageContract:
+    """What a stage reads and answers.
+
+    Attributes:
+        inputs: Its input ports beside `request`.
+        answer: Types that its result's value may have.
+    """
+
+    inputs: Ports
+    answer: tuple[type, ...]
+
+
+STAGES = {
+    "motion_planner": StageContract(
+        {"state": 2 * NQ, "wall": StageResult(), "surface_map": SurfaceMap.empty()},
+        (Motion, type(None)),
+    ),
+    "wall_finder": StageContract({"surface_map": SurfaceMap.empty()}, (Wall,)),
+    "wall_segmenter": StageContract(
+        {"surface_map": SurfaceMap.empty(), "wall": StageResult()},
+        (WallSegmentation,),
+    ),
+    "spray_path_planner": StageContract(
+        {"state": 2 * NQ, "segmentation": StageResult()}, (PaintProgram,)
+    ),
+}
+"""The stages of a paint cycle. Each also has the input `request` (StageRequest) and
+the output `result` (StageResult)."""
 
 
 class Stage(LeafSystem):
-    """Base of the systems that do one heavy piece of work when the cycle asks for it.
+    """Base of the systems that do one heavy piece of work when the cycle requests it.
 
     .. pydrake_system::
 
         name: Stage
         input_ports:
         - request
-        - (the subclass's own)
+        - (those of the stage's contract)
         output_ports:
         - result
 
@@ -28,54 +69,99 @@ class Stage(LeafSystem):
         request: StageRequest; acted on when it names this stage and has a new number.
         result: StageResult of the last request that named this stage.
 
-    State is one StageResult. An error of Painter's own becomes a failed result, so that
-    the cycle can stop the arm and name the cause; any other exception is a bug and ends
+    State is one StageResult. A PainterError or PerceptionError becomes a failed result:
+    the cycle stops the arm and names the cause. Any other exception is a bug and ends
     the simulation.
     """
 
-    def __init__(self, *, stage: str, period: float) -> None:
+    def __init__(
+        self, *, stage: str, period: float = 0.02, inputs: Ports | None = None
+    ) -> None:
         """Creates the stage.
 
         Args:
-            stage: Name that requests use.
-            period: Time between looks at the request, s.
+            stage: Its name in requests, one of `STAGES`.
+            period: Time between checks for a new request, s.
+            inputs: Input ports beside `request`; None = those of the stage's contract.
         """
         super().__init__()
         self._stage = stage
-        self._request_port = self.DeclareAbstractInputPort(
-            "request", Value(StageRequest())
-        )
+        # Inputs.
+        ports = STAGES[stage].inputs if inputs is None else inputs
+        self._kinds = {"request": StageRequest(), **ports}
+        self._ports = DeclareInputs(self, self._kinds)
+        # State.
         self._result_index = self.DeclareAbstractState(Value(StageResult()))
+        # Outputs.
         self.DeclareStateOutputPort("result", self._result_index)
+        # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateResult)
 
-    def _Work(self, context: Context, goal: str) -> Any:
-        """Does the work; returns a frozen value, raises an error of Painter's own."""
+    def Work(self, context: Context, goal: str) -> Any:
+        """Does the work; to be overridden.
+
+        Args:
+            context: To read the inputs with.
+            goal: What is requested, where the stage can do more than one thing.
+
+        Returns:
+            The answer, a frozen value of the type in `STAGES`.
+
+        Raises:
+            PainterError: There is no answer; says why.
+            PerceptionError: The same.
+        """
         raise NotImplementedError
 
-    def _Warning(self, context: Context) -> str | None:
-        """Returns what somebody should look at although the work is done, if any."""
+    def Warning(self, context: Context) -> str | None:
+        """Returns what a person should check although the work is done, if anything."""
         return None
 
+    def Read(self, context: Context, port: str) -> Any:
+        """Returns an input: a vector (n,), or a value of the declared type.
+
+        Raises:
+            PortTypeError: The port carries a value of another type.
+        """
+        kind = self._kinds[port]
+        if isinstance(kind, int):
+            return self._ports[port].Eval(context).copy()
+        return EvalAs(self._ports[port], context, type(kind))
+
+    def ReadAnswer(self, context: Context, port: str, kind: type[T]) -> T:
+        """Returns the answer of another stage.
+
+        Args:
+            context: Of this stage.
+            port: Input that carries the other stage's StageResult.
+            kind: Expected type of its value.
+
+        Raises:
+            PainterError: The other stage has no such answer yet.
+        """
+        value = self.Read(context, port).value
+        if not isinstance(value, kind):
+            raise PainterError(
+                f"{self.GetSystemPathname()}:{port} holds {type(value).__name__}, "
+                f"expected {kind.__name__}.",
+                code="PNT-CYCLE-013",
+            )
+        return value
+
     def _UpdateResult(self, context: Context, state: State) -> EventStatus:
-        request = EvalAs(self._request_port, context, StageRequest)
+        request: StageRequest = self.Read(context, "request")
         index = int(self._result_index)
         last: StageResult = context.get_abstract_state(index).get_value()
         if request.stage != self._stage or request.number == last.number:
             return EventStatus.DidNothing()
         start = time.perf_counter()
-        value, error, warning = None, None, None
+        result = StageResult(number=request.number)
         try:
-            value = self._Work(context, request.goal)
-            warning = self._Warning(context)
+            value = self.Work(context, request.goal)
+            result = result.replace(value=value, warning=self.Warning(context))
         except (PainterError, PerceptionError) as failure:
             error = f"{type(failure).__name__}: {failure}"
-        result = StageResult(
-            number=request.number,
-            value=value,
-            error=error,
-            warning=warning,
-            compute_time=time.perf_counter() - start,
-        )
+            result = result.replace(error=error, code=failure.code)
+        result = result.replace(compute_time=time.perf_counter() - start)
         state.get_mutable_abstract_state(index).set_value(result)
         return EventStatus.Succeeded()

@@ -2,7 +2,7 @@
 
 import enum
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -31,6 +31,19 @@ class Phase(enum.Enum):
     ABORTED = "ABORTED"
 
 
+@dataclass(frozen=True)
+class Fault(FrozenValue):
+    """Why a cycle cannot go on.
+
+    Attributes:
+        cause: In one line.
+        code: Stable name of the fault, "PNT-AREA-NNN".
+    """
+
+    cause: str
+    code: str
+
+
 @dataclass(frozen=True, eq=False)
 class DriveStatus(FrozenValue):
     """One drive. `following_error` in rad; `fault_code` 0 = none (CiA 402, 603Fh)."""
@@ -46,23 +59,26 @@ class ArmStatus(FrozenValue):
 
     Attributes:
         drives: State of each.
-        stopped: Why the body has stopped the arm by itself, in a line; else empty.
+        stopped: Why the body has stopped the arm by itself, or None.
     """
 
     drives: tuple[DriveStatus, ...] = field(
         default_factory=lambda: (DriveStatus(),) * 5
     )
-    stopped: str = ""
+    stopped: Fault | None = None
 
     @property
-    def fault(self) -> str | None:
-        """Says why the body stopped, or names the first drive that failed, or None."""
-        if self.stopped:
+    def fault(self) -> Fault | None:
+        """Why the body stopped, or else the first drive that failed, or None."""
+        if self.stopped is not None:
             return self.stopped
         for number, drive in enumerate(self.drives, start=1):
             if drive.fault_code or drive.state != "OPERATION ENABLED":
-                code = f"0x{drive.fault_code:04X}"
-                return f"drive {number}: {drive.state}, fault code {code}"
+                cause = (
+                    f"drive {number}: {drive.state}, fault code "
+                    f"0x{drive.fault_code:04X}"
+                )
+                return Fault(cause, code="PNT-CYCLE-014")
         return None
 
 
@@ -73,8 +89,8 @@ class CameraStatus(FrozenValue):
     Attributes:
         state: "starting", "streaming", "missing" (it is being opened again) or "lost".
         problem: Why there are no pictures, in a line; empty while there are.
-        pictures: Pictures so far.
-        dropped: Pictures that were repeated or came too late.
+        pictures: Images so far.
+        dropped: Images that were repeated or came too late.
     """
 
     state: str = "streaming"
@@ -90,12 +106,12 @@ class CameraStatus(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class StageRequest(FrozenValue):
-    """Asks a stage for work; a stage answers each `number` once.
+    """Requests work of a stage, which answers each `number` once.
 
     Attributes:
-        number: Counts up over the cycle; 0 = nothing asked yet.
-        stage: Name of the stage that is asked ("wall_finder", "wall_segmenter", ...).
-        goal: What is wanted of it, where it can do more than one thing.
+        number: Counts up over the cycle; 0 = no request yet.
+        stage: Name of the stage ("wall_finder", "wall_segmenter", ...).
+        goal: What to do, where the stage can do more than one thing.
     """
 
     number: int = 0
@@ -111,25 +127,27 @@ class StageResult(FrozenValue):
         number: Of the request; 0 = nothing done yet.
         value: The result, or None where it failed.
         error: One line saying why it failed, or None.
-        warning: One line saying what somebody should look at, or None.
+        code: Stable name of that error, or None.
+        warning: One line saying what a person should check, or None.
         compute_time: Wall-clock time of the work, s; a log entry, never a decision.
     """
 
     number: int = 0
     value: Any = None
     error: str | None = None
+    code: str | None = None
     warning: str | None = None
     compute_time: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class MotionCommand(FrozenValue):
-    """What the path follower is to do.
+    """Commands the path follower.
 
     Attributes:
         number: Counts up with every new motion; 0 = hold where the arm is.
         motion: Motion to follow from its beginning once `number` is new.
-        rate: Wanted rate of time along the motion: 1 = as planned, 0 = stand still.
+        rate: Commanded rate of time along the motion: 1 = as planned, 0 = stand still.
         spray: False keeps the gun closed, whatever the motion says.
     """
 
@@ -141,13 +159,13 @@ class MotionCommand(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class OperatorCommand(FrozenValue):
-    """A word of the operator: "approve", "pause", "resume", "abort".
+    """A command of the operator: "approve", "pause", "resume" or "abort".
 
     `number` counts up with every command; 0 = none yet.
     """
 
     number: int = 0
-    word: str = ""
+    command: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,9 +177,8 @@ class FollowerStatus(FrozenValue):
         position: Path time, s.
         duration: Of the whole motion, s.
         rate: Path time per time: 1 = as planned, 0 = standing.
-        spraying: Whether the motion has its gun open there.
-        strokes_done: How many of the motion's strokes are behind it, with the share of
-            the one that it is on.
+        spraying: Whether the gun is open at that point of the motion.
+        strokes_done: Strokes done, with the share of the one in progress.
     """
 
     number: int = 0
@@ -173,26 +190,44 @@ class FollowerStatus(FrozenValue):
 
     @property
     def done(self) -> bool:
-        """True once the motion has come to its end."""
+        """True once the motion is at its end."""
         return self.number > 0 and self.position >= self.duration
 
 
 @dataclass(frozen=True, eq=False)
 class CycleStatus(FrozenValue):
-    """What the paint cycle is doing.
+    """State of the paint cycle, as it reports it.
 
     Attributes:
         phase: Present phase.
         cause: Why the cycle is in FAULT or ABORTED, else "".
+        code: Stable name of that cause, else "".
         finished: True once nothing more will happen.
-        next_stroke: Number of the stroke, from 1, with which a job that was paused or
-            stopped goes on; its fraction is the share of it that is done. 0 = painting
-            has not begun.
+        next_stroke: Number of the stroke, from 1, at which a paused or stopped job
+            continues; its fraction is the share that is done. 0 = painting has not
+            begun.
         events: What happened so far: (time s, name, data) each.
     """
 
     phase: Phase = Phase.HOME
     cause: str = ""
+    code: str = ""
     finished: bool = False
     next_stroke: float = 0.0
     events: tuple[tuple[float, str, dict[str, Any]], ...] = ()
+
+    def logged(self, time: float, name: str, **data: Any) -> Self:
+        """Returns the status with one more event."""
+        return self.replace(events=(*self.events, (time, name, data)))
+
+    def aborted(self, fault: Fault, time: float) -> Self:
+        """Returns the status of a cycle that was interrupted."""
+        status = self.replace(
+            phase=Phase.ABORTED, cause=fault.cause, code=fault.code, finished=True
+        )
+        return status.logged(time, "phase", phase=Phase.ABORTED.value)
+
+    def stop_data(self) -> dict[str, Any]:
+        """Returns what the event "stopped" says: why, and the stroke to continue at."""
+        data: dict[str, Any] = {"cause": self.cause, "code": self.code}
+        return data | ({"next_stroke": self.next_stroke} if self.next_stroke else {})

@@ -100,7 +100,7 @@ def job():
     return scenario, Remainder(true_segmentation(scenario), strokes)
 
 
-def paint(strike, *, on_watch=lambda loop: None):
+def paint(strike, *, on_watch=lambda loop: None, interruption=lambda: None):
     """Paints until the fault has ended the cycle; returns loop, witness and log."""
     scenario, remainder = job()
     loop = Loop(scenario, world=False).bring_up()
@@ -113,6 +113,7 @@ def paint(strike, *, on_watch=lambda loop: None):
             loop.connection(),
             remainder=remainder,
             watch=lambda *args: on_watch(loop),
+            interruption=interruption,
         )
     except ProgramKilledError:
         # What BusLoop does when the pipe of the diagram's side ends.
@@ -199,6 +200,7 @@ def test_a_fault_while_painting(fault, axis, cause, known, closed):
     check_stop(loop, witness, knows_within=known, closes_within=closed)
     assert log.status.phase == Phase.FAULT
     assert cause in log.status.cause
+    assert log.status.code == "PNT-CYCLE-020"
     _, remainder = job()
     # A blocked axis leads the gun astray long before the drive's window is full.
     is_astray = fault == Fault.FOLLOWING_ERROR
@@ -281,6 +283,19 @@ def test_a_killed_diagram_while_painting():
     )
 
 
+def test_an_interruption_while_painting():
+    struck = []
+    loop, witness, log = paint(
+        struck.append, interruption=lambda: "Ctrl-C" if struck else None
+    )
+    # Between two observations of the cycle.
+    check_stop(loop, witness, knows_within=0.025, closes_within=CYCLE)
+    assert (log.status.phase, log.status.cause) == (Phase.ABORTED, "Ctrl-C")
+    assert log.status.code == "PNT-CYCLE-021"
+    assert log.status.events[-1][2] == {"phase": "ABORTED"}
+    go_on(loop, log)
+
+
 def test_an_unplugged_camera_while_painting():
     def unplug(loop):
         loop.unplugged = True
@@ -289,6 +304,7 @@ def test_an_unplugged_camera_while_painting():
     check_stop(loop, witness, knows_within=0.1, closes_within=CYCLE)
     assert log.status.phase == Phase.FAULT
     assert "camera: it was unplugged" in log.status.cause
+    assert log.status.code == "PNT-CYCLE-019"
     go_on(loop, log)
 
 

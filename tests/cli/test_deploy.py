@@ -45,18 +45,18 @@ def test_step_by_step_pauses_asks_once_and_goes_on():
         return "PAINT" not in question
 
     dut = StepByStep(every_phase=True, review=False, ask=ask)
-    assert dut.word(Phase.SCAN) == "pause"
-    assert dut.word(Phase.SCAN) is None  # It takes until the arm stands.
-    assert dut.word(Phase.PAUSED) == "resume"
-    assert dut.word(Phase.SCAN) is None
-    assert dut.word(Phase.PAINT) == "pause"
-    assert dut.word(Phase.PAUSED) == "abort"
-    assert dut.word(Phase.ABORTED) is None
-    assert asked == ["Go on with SCAN?", "Go on with PAINT?"]
+    assert dut.command(Phase.SCAN) == "pause"
+    assert dut.command(Phase.SCAN) is None  # It takes until the arm stands.
+    assert dut.command(Phase.PAUSED) == "resume"
+    assert dut.command(Phase.SCAN) is None
+    assert dut.command(Phase.PAINT) == "pause"
+    assert dut.command(Phase.PAUSED) == "abort"
+    assert dut.command(Phase.ABORTED) is None
+    assert asked == ["Continue with SCAN?", "Continue with PAINT?"]
 
 
 def test_a_program_is_approved_once_where_somebody_attends():
     dut = StepByStep(every_phase=False, review=True, ask=lambda question: True)
-    assert dut.word(Phase.PLAN) is None
-    assert dut.word(Phase.REVIEW) == "approve"
-    assert dut.word(Phase.REVIEW) is None
+    assert dut.command(Phase.PLAN) is None
+    assert dut.command(Phase.REVIEW) == "approve"
+    assert dut.command(Phase.REVIEW) is None

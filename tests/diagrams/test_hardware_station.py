@@ -18,8 +18,8 @@ from painter.canopen.master.feedback import BusState
 from painter.canopen.process.robot_clock import RobotClock
 from painter.canopen.sim.rack import Fault
 from painter.config import load_scenario
-from painter.cycle.deploy import executions, robot_times
-from painter.diagrams.station import CHEAT_PREFIX, CheckPorts, MakeStation
+from painter.cycle.bus_record import executions, robot_times
+from painter.diagrams.station import CHEAT_PREFIX, CheckStation, MakeStation
 from painter.errors import BusError
 from painter.systems.values import ArmStatus
 from tests.hil import Loop, blind_reading
@@ -58,14 +58,14 @@ def test_both_stations_have_the_same_ports(loop):
     scenario = loop.scenario
     simulated = MakeStation(scenario)
     robot = MakeStation(scenario, connection=loop.connection(read_camera=blind_reading))
-    CheckPorts(robot)
+    CheckStation(robot)
     assert ports(robot) == ports(simulated)
     assert len(ports(robot)) == 7
 
 
 def test_nothing_outside_the_station_knows_which_body_it_has():
     """The brain's diagram and its systems import nothing of the robot's side."""
-    brain = [ROOT / "painter/diagrams/paint_cycle.py"]
+    brain = [ROOT / "painter/diagrams/brain.py"]
     brain += sorted((ROOT / "painter/systems/brain").glob("*.py"))
     assert len(brain) > 8
     for path in brain:
@@ -130,11 +130,11 @@ def test_a_stop_of_the_bus_is_a_fault_with_its_reason(loop):
     loop.bus.wait_until(loop.bus.now() + 0.05)
     simulator.AdvanceTo(0.03)
     status = station.GetOutputPort("arm.status").Eval(context)
-    assert "elbow_pitch: EMCY 3220h" in status.fault
+    assert "elbow_pitch: EMCY 3220h" in status.fault.cause
     loop.bus.kill()
     simulator.AdvanceTo(0.05)
     assert "the bus process has ended" in (
-        station.GetOutputPort("arm.status").Eval(context).fault
+        station.GetOutputPort("arm.status").Eval(context).fault.cause
     )
 
 

@@ -12,7 +12,8 @@ from pydrake.systems.primitives import (
 from pydrake.trajectories import PiecewisePolynomial
 
 from painter.config import load_scenario
-from painter.diagrams.station import CheckPorts, MakeStation
+from painter.diagrams.station import CheckStation, MakeStation
+from painter.errors import PortTypeError
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def scenario():
 
 def test_ports_are_the_contract_with_their_types(scenario):
     station = MakeStation(scenario)
-    CheckPorts(station)
+    CheckStation(station)
     sizes = {
         "arm.state_estimated": 10,
         "wall_camera.image_time": 1,
@@ -39,8 +40,8 @@ def test_a_station_with_other_ports_is_refused():
     builder = DiagramBuilder()
     source = builder.AddSystem(ConstantVectorSource([0.0]))
     builder.ExportOutput(source.get_output_port(), "arm.status")
-    with pytest.raises(ValueError, match=r"missing \['arm.desired_state'"):
-        CheckPorts(builder.Build())
+    with pytest.raises(PortTypeError, match=r"no input arm.desired_state"):
+        CheckStation(builder.Build())
 
 
 def test_arm_tracks_a_swing_and_the_camera_sees_the_wall(scenario):

@@ -46,6 +46,7 @@ def run_figures(folder: RunFolder) -> dict[str, Any]:
         "seed": scenario.get("random_seed"),
         "result": last["result"],
         "cause": last.get("cause"),
+        "code": last.get("code"),
     }
     figures |= time_figures(events)
     figures |= _mask(folder)

@@ -135,9 +135,10 @@ class RunFolder:
         """Removes the mark INCOMPLETE; the last thing a run does."""
         (self.path / INCOMPLETE).unlink(missing_ok=True)
 
-    def mark_incomplete(self, reason: str) -> None:
-        """Says in INCOMPLETE why the run is not complete, one line."""
-        (self.path / INCOMPLETE).write_text(reason + "\n")
+    def mark_incomplete(self, reason: str, code: str | None = None) -> None:
+        """Says in INCOMPLETE why the run is not complete: one line, with the code."""
+        text = reason if code is None else f"{reason} [{code}]"
+        (self.path / INCOMPLETE).write_text(text + "\n")
 
     def log(self, time: float, name: str, **data: Any) -> None:
         """Appends one line to the event log and flushes it.

@@ -16,6 +16,7 @@ def finish_run(
     result: str,
     wall_clock: float,
     cause: str | None = None,
+    code: str | None = None,
 ) -> dict[str, Any]:
     """Logs how a run ended, writes its report and, if it came to DONE, completes it.
 
@@ -27,17 +28,18 @@ def finish_run(
         result: "DONE", "FAULT" or "ABORTED".
         wall_clock: Time the program ran, s.
         cause: Why it did not come to DONE, one line.
+        code: Stable name of that cause, "PNT-AREA-NNN".
 
     Returns:
         The content of report.json.
     """
-    end = {"result": result, "cause": cause, "wall_clock_s": wall_clock}
+    end = {"result": result, "cause": cause, "code": code, "wall_clock_s": wall_clock}
     folder.log(time, ENDED, **end)
     figures = write_report(folder)
     if result == DONE:
         folder.complete()
     else:
-        folder.mark_incomplete(f"{result}: {cause or 'no cause is known'}")
+        folder.mark_incomplete(f"{result}: {cause or 'no cause is known'}", code)
     return figures
 
 

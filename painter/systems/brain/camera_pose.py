@@ -8,10 +8,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
 
 from painter.errors import PainterError
-from painter.planning.arm.kinematics import ArmKinematics
+from painter.planning.arm.kinematics import NQ, ArmKinematics
 from perception.ground import FloatArray, FrozenValue
-
-_NQ = 5
 
 
 class ImageTimeError(PainterError):
@@ -33,7 +31,7 @@ class JointHistory(FrozenValue):
     @classmethod
     def empty(cls) -> "JointHistory":
         """Makes a history of nothing."""
-        return cls(time=np.zeros(0), q=np.zeros((0, _NQ)))
+        return cls(time=np.zeros(0), q=np.zeros((0, NQ)))
 
     def append(self, time: float, q: FloatArray, *, length: float) -> "JointHistory":
         """Returns the history with `q` at `time`, s, back to `length` s before it.
@@ -101,7 +99,7 @@ class CameraPose(LeafSystem):
         self._X_CCm = RigidTransform() if X_CCm is None else X_CCm
         self._length = length
         # Inputs.
-        self._state_port = self.DeclareVectorInputPort("state", 2 * _NQ)
+        self._state_port = self.DeclareVectorInputPort("state", 2 * NQ)
         self._time_port = self.DeclareVectorInputPort("image_time", 1)
         # State.
         self._history_index = self.DeclareAbstractState(Value(JointHistory.empty()))
@@ -123,7 +121,7 @@ class CameraPose(LeafSystem):
     def _History(self, context: Context) -> JointHistory:
         """Returns the history up to and with now."""
         history = context.get_abstract_state(int(self._history_index)).get_value()
-        q = self._state_port.Eval(context)[:_NQ]
+        q = self._state_port.Eval(context)[:NQ]
         return history.append(context.get_time(), q, length=self._length)
 
     def _CalcPose(self, context: Context, output: Value) -> None:

@@ -1,4 +1,4 @@
-"""A stage whose answer is known from before."""
+"""A stage whose answer is known before the cycle."""
 
 from pydrake.systems.framework import Context
 
@@ -7,7 +7,7 @@ from perception.ground import FrozenValue
 
 
 class KnownResult(Stage):
-    """Answers with what an earlier cycle found, where this one need not look again.
+    """Answers with the result of an earlier cycle.
 
     .. pydrake_system::
 
@@ -28,12 +28,13 @@ class KnownResult(Stage):
         """Creates the stage.
 
         Args:
-            stage: Name of the stage that it stands in for.
-            value: Its answer to every request.
-            period: Time between looks at the request, s.
+            stage: Name of the stage that it replaces.
+            value: Answer to every request.
+            period: Time between checks for a new request, s.
         """
-        super().__init__(stage=stage, period=period)
+        super().__init__(stage=stage, period=period, inputs={})
         self._value = value
 
-    def _Work(self, context: Context, goal: str) -> FrozenValue:
+    def Work(self, context: Context, goal: str) -> FrozenValue:
+        """Returns the known value; see `Stage.Work`."""
         return self._value

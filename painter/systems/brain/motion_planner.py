@@ -1,16 +1,13 @@
 """The stage that plans the cycle's motions with the gun closed."""
 
-import numpy as np
-from pydrake.common.value import Value
 from pydrake.systems.framework import Context
 
 from painter.errors import PainterError
+from painter.planning.arm.kinematics import NQ
 from painter.planning.scan.free_motion import GOALS, FreeMotionPlanner
 from painter.planning.spray_path import Motion
 from painter.planning.tile import nominal_tile_pose
-from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
-from painter.systems.values import StageResult
 from perception.config import SegmentationConfig
 from perception.fine_steps.shadows import find_relief
 from perception.ground import check_positive
@@ -20,7 +17,7 @@ MORE_LOOKS = "more looks"
 
 
 class MotionPlanner(Stage):
-    """Plans the way home, to first sight, along the scan, more looks, and back.
+    """Plans the motions home, to the first look, along the scan, and the retreat.
 
     .. pydrake_system::
 
@@ -36,12 +33,12 @@ class MotionPlanner(Stage):
     Ports:
         request: StageRequest; acted on when it names "motion_planner" and is new; its
             goal is "home", "look", "scan", "more looks" or "retract".
-        state: (10,) q and v, rad and rad/s, where the arm stands, at rest.
-        wall: StageResult of the wall finder; until it holds a Wall the wall is taken
-            to be where the job expects it.
+        state: (10,) q and v, rad and rad/s, of the arm, at rest.
+        wall: StageResult of the wall finder; until it holds a Wall, the wall is
+            assumed where the job expects it.
         surface_map: SurfaceMap in W, of the whole scan; read for "more looks" alone.
         result: StageResult; its value is a Motion, or None where no more looks are
-            wanted.
+            needed.
 
     State is the last StageResult.
     """
@@ -56,10 +53,10 @@ class MotionPlanner(Stage):
         """Creates the stage.
 
         Args:
-            planner: Of the robot and its settings; before first sight and scan it makes
-                sure that the arm reaches the whole tile.
-            cell: Of the grid on which the scan is looked at for shadows, m.
-            period: Time between looks at the request, s.
+            planner: Of the robot and its settings; before look and scan it checks that
+                the arm reaches the whole tile.
+            cell: Edge of a cell of the grid on which shadows of the scan are sought, m.
+            period: Time between checks for a new request, s.
 
         Raises:
             ValueError: A setting is out of bounds.
@@ -72,27 +69,22 @@ class MotionPlanner(Stage):
         super().__init__(stage="motion_planner", period=period)
         self._planner = planner
         self._cell = cell
-        # Inputs.
-        self._state_port = self.DeclareVectorInputPort("state", 10)
-        self._wall_port = self.DeclareAbstractInputPort("wall", Value(StageResult()))
-        self._map_port = self.DeclareAbstractInputPort(
-            "surface_map", Value(SurfaceMap.empty())
-        )
 
-    def _Work(self, context: Context, goal: str) -> Motion | None:
+    def Work(self, context: Context, goal: str) -> Motion | None:
+        """Returns the motion to a goal; see `Stage.Work`."""
         if goal not in (*GOALS, MORE_LOOKS):
             raise PainterError(
                 f"{self.GetSystemPathname()}: goal must be one of "
                 f"{', '.join((*GOALS, MORE_LOOKS))}, got {goal!r}.",
                 code="PNT-CYCLE-004",
             )
-        wall = EvalAs(self._wall_port, context, StageResult).value
+        wall = self.Read(context, "wall").value
         tile = self._planner.tile
         X_WT = wall.X_WT if isinstance(wall, Wall) else nominal_tile_pose(tile)
-        q0 = np.array(self._state_port.Eval(context)[:5])
+        q0 = self.Read(context, "state")[:NQ]
         if goal != MORE_LOOKS:
             return self._planner.plan(goal, q0, X_WT)
-        surface_map = EvalAs(self._map_port, context, SurfaceMap)
+        surface_map: SurfaceMap = self.Read(context, "surface_map")
         X_TW = X_WT.inverse()
         relief = find_relief(
             X_TW @ surface_map.p_WQs,

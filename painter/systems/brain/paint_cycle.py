@@ -1,9 +1,6 @@
 """The sequence of a paint cycle: phases, operator, faults."""
 
-import enum
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Self
 
 from pydrake.common.value import Value
 from pydrake.systems.framework import (
@@ -14,10 +11,14 @@ from pydrake.systems.framework import (
     State,
 )
 
-from painter.systems.ports import EvalAs
+from painter.planning.spray_path import Motion
+from painter.systems.cycle_state import SEQUENCE, Action, CycleState, CycleStep
+from painter.systems.ports import DeclareInputs, EvalAs
+from painter.systems.stage import STAGES
 from painter.systems.values import (
     ArmStatus,
     CycleStatus,
+    Fault,
     FollowerStatus,
     MotionCommand,
     OperatorCommand,
@@ -25,95 +26,8 @@ from painter.systems.values import (
     StageRequest,
     StageResult,
 )
-from perception.ground import FrozenValue
 
-
-class Action(enum.Enum):
-    """What a step of the sequence does."""
-
-    MOVE = "plans a motion with the motion planner and follows it, if there is one"
-    HOLD = "stands still while the camera looks"
-    WORK = "asks a stage for its result"
-    REVIEW = "waits for the operator's approval"
-    PAINT = "follows the paint program"
-
-
-@dataclass(frozen=True)
-class CycleStep:
-    """One step: in a phase, an action, and the goal or stage that it names."""
-
-    phase: Phase
-    action: Action
-    name: str = ""
-
-
-SEQUENCE = (
-    CycleStep(Phase.HOME, Action.MOVE, "home"),
-    CycleStep(Phase.LOOK, Action.MOVE, "look"),
-    CycleStep(Phase.LOOK, Action.HOLD),
-    CycleStep(Phase.LOOK, Action.WORK, "wall_finder"),
-    CycleStep(Phase.SCAN, Action.MOVE, "scan"),
-    CycleStep(Phase.SCAN, Action.MOVE, "more looks"),
-    CycleStep(Phase.SEGMENT, Action.WORK, "wall_segmenter"),
-    CycleStep(Phase.PLAN, Action.WORK, "spray_path_planner"),
-    CycleStep(Phase.REVIEW, Action.REVIEW),
-    CycleStep(Phase.PAINT, Action.PAINT),
-    CycleStep(Phase.RETRACT, Action.MOVE, "retract"),
-)
-# Where the wall is known from before, nothing is looked at.
-KNOWN_WALL_SEQUENCE = tuple(
-    step
-    for step in SEQUENCE
-    if step.phase not in (Phase.LOOK, Phase.SCAN) or step.action == Action.WORK
-)
 PLANNER = "motion_planner"
-STAGES = (PLANNER, "wall_finder", "wall_segmenter", "spray_path_planner")
-
-
-@dataclass(frozen=True, eq=False)
-class CycleState(FrozenValue):
-    """State of a `PaintCycle`.
-
-    Attributes:
-        step: Index in the cycle's sequence.
-        since: When the step (or its motion) began, s.
-        request: Last request to a stage.
-        command: Last command to the path follower.
-        moving: True once the step's motion was commanded.
-        operator_number: Last operator command acted on.
-        pausing: True from the operator's "pause" until "resume".
-        status: What the cycle reports.
-    """
-
-    step: int = 0
-    since: float = 0.0
-    request: StageRequest = field(default_factory=StageRequest)
-    command: MotionCommand = field(default_factory=MotionCommand)
-    moving: bool = False
-    operator_number: int = 0
-    pausing: bool = False
-    status: CycleStatus = field(default_factory=CycleStatus)
-
-    def logged(self, time: float, name: str, **data: Any) -> Self:
-        """Returns the state with one more event."""
-        events = (*self.status.events, (time, name, data))
-        return self.replace(status=self.status.replace(events=events))
-
-    def in_phase(self, phase: Phase, time: float) -> Self:
-        """Returns the state in a phase; a change of phase is logged."""
-        if phase == self.status.phase and self.status.events:
-            return self
-        status = self.status.replace(phase=phase)
-        return self.replace(status=status).logged(time, "phase", phase=phase.value)
-
-    def asking(self, stage: str, goal: str = "") -> Self:
-        """Returns the state with a new request."""
-        number = self.request.number + 1
-        return self.replace(request=StageRequest(number, stage, goal))
-
-    def with_command(self, **changes: Any) -> Self:
-        """Returns the state with a changed motion command."""
-        return self.replace(command=self.command.replace(**changes))
 
 
 class PaintCycle(LeafSystem):
@@ -144,12 +58,12 @@ class PaintCycle(LeafSystem):
         operator: OperatorCommand; may be left unconnected.
         request: StageRequest to the four stages.
         motion_command: MotionCommand to the path follower.
-        camera_enabled: (1,) 1 while pictures are wanted.
+        camera_enabled: (1,) 1 while pictures are to be fused.
         cycle_status: CycleStatus.
 
-    A failed stage, a drive fault or the time limit ends the cycle in FAULT: the gun
-    closes and the arm comes to a stand on its path. "abort" does the same and then
-    retracts. "pause" lets a stroke that is being sprayed end first.
+    A failed stage, a stage's answer of another type, a drive fault or the time limit
+    ends the cycle in FAULT: the gun closes and the arm stops on its path. "abort" does
+    the same and then retracts. "pause" waits for the end of the stroke in progress.
     """
 
     def __init__(
@@ -166,7 +80,7 @@ class PaintCycle(LeafSystem):
         Args:
             unattended: True skips the operator's approval.
             period: Time between decisions, s.
-            look_time: How long the arm stands still for first sight, s.
+            look_time: How long the arm holds still for the first pictures, s.
             time_limit: A cycle that lasts longer is a fault, s.
             sequence: Steps of the cycle, the last one the retreat from the wall.
         """
@@ -176,18 +90,14 @@ class PaintCycle(LeafSystem):
         self._time_limit = time_limit
         self._sequence = tuple(sequence)
         # Inputs.
-        self._status_port = self.DeclareAbstractInputPort(
-            "arm_status", Value(ArmStatus())
-        )
-        self._follower_port = self.DeclareAbstractInputPort(
-            "follower_status", Value(FollowerStatus())
-        )
-        self._stage_ports = {
-            stage: self.DeclareAbstractInputPort(stage, Value(StageResult()))
-            for stage in STAGES
-        }
-        self._operator_port = self.DeclareAbstractInputPort(
-            "operator", Value(OperatorCommand())
+        self._ports = DeclareInputs(
+            self,
+            {
+                "arm_status": ArmStatus(),
+                "follower_status": FollowerStatus(),
+                **dict.fromkeys(STAGES, StageResult()),
+                "operator": OperatorCommand(),
+            },
         )
         # State.
         self._state_index = self.DeclareAbstractState(Value(CycleState()))
@@ -240,14 +150,14 @@ class PaintCycle(LeafSystem):
     def _Next(self, context: Context, now: CycleState) -> CycleState:
         """Returns the state after one decision."""
         time = context.get_time()
-        follower = EvalAs(self._follower_port, context, FollowerStatus)
-        phase = now.status.phase
-        if phase in (Phase.FAULT, Phase.ABORTED):
+        follower = EvalAs(self._ports["follower_status"], context, FollowerStatus)
+        if now.status.phase in (Phase.FAULT, Phase.ABORTED):
             return self._NextStopped(context, now, follower)
         now = self._CountStrokes(now, follower)
-        fault = EvalAs(self._status_port, context, ArmStatus).fault
+        fault = EvalAs(self._ports["arm_status"], context, ArmStatus).fault
         if fault is None and time > self._time_limit:
-            fault = f"cycle not done after {self._time_limit:g} s"
+            cause = f"cycle not done after {self._time_limit:g} s"
+            fault = Fault(cause, code="PNT-CYCLE-015")
         if fault is not None:
             return self._Stopped(now, Phase.FAULT, fault, time)
         now = self._NextOperator(context, now, time)
@@ -258,41 +168,43 @@ class PaintCycle(LeafSystem):
         return self._NextStep(context, now, follower)
 
     def _CountStrokes(self, now: CycleState, follower: FollowerStatus) -> CycleState:
-        """Keeps with which stroke the job would go on; the gun closes at once."""
+        """Records the stroke at which the job would continue if it stopped now."""
         painting = self._sequence[now.step].action == Action.PAINT and now.moving
         if not painting or follower.number != now.command.number:
             return now
         number = 1.0 + follower.strokes_done
         if number == now.status.next_stroke:
             return now
-        return now.replace(status=now.status.replace(next_stroke=number))
+        return now.reporting(next_stroke=number)
 
     def _NextOperator(
         self, context: Context, now: CycleState, time: float
     ) -> CycleState:
-        if not self._operator_port.HasValue(context):
+        if not self._ports["operator"].HasValue(context):
             return now
-        command = EvalAs(self._operator_port, context, OperatorCommand)
-        if command.number == now.operator_number:
+        operator = EvalAs(self._ports["operator"], context, OperatorCommand)
+        if operator.number == now.operator_number:
             return now
-        now = now.replace(operator_number=command.number)
-        now = now.logged(time, "operator", word=command.word)
+        command = operator.command
+        now = now.replace(operator_number=operator.number)
+        now = now.logged(time, "operator", command=command)
         step = self._sequence[now.step]
-        if command.word == "abort":
-            return self._Stopped(now, Phase.ABORTED, "aborted by the operator", time)
-        if command.word == "pause":
+        if command == "abort":
+            fault = Fault("aborted by the operator", code="PNT-CYCLE-016")
+            return self._Stopped(now, Phase.ABORTED, fault, time)
+        if command == "pause":
             return now.replace(pausing=True)
-        if command.word == "resume" and now.pausing:
+        if command == "resume" and now.pausing:
             now = now.replace(pausing=False).with_command(rate=1.0)
             return now.in_phase(step.phase, time)
-        if command.word == "approve" and step.action == Action.REVIEW:
+        if command == "approve" and step.action == Action.REVIEW:
             return self._Entered(now, now.step + 1, time)
-        return now.logged(time, "refused", word=command.word)
+        return now.logged(time, "refused", command=command)
 
     def _NextPaused(
         self, now: CycleState, follower: FollowerStatus, time: float
     ) -> CycleState:
-        # A stroke that is being sprayed ends first: a stop inside it would show.
+        # The stroke in progress ends first: a stop inside it would show in the film.
         if now.command.rate != 0.0 and not (now.moving and follower.spraying):
             now = now.with_command(rate=0.0)
         if now.command.rate == 0.0:
@@ -300,19 +212,18 @@ class PaintCycle(LeafSystem):
         return now
 
     def _Stopped(
-        self, now: CycleState, phase: Phase, cause: str, time: float
+        self, now: CycleState, phase: Phase, fault: Fault, time: float
     ) -> CycleState:
         now = now.with_command(rate=0.0, spray=False).replace(moving=False, since=time)
-        now = now.replace(status=now.status.replace(cause=cause))
-        at = now.status.next_stroke
-        data = {"cause": cause} | ({"next_stroke": at} if at else {})
-        return now.in_phase(phase, time).logged(time, "stopped", **data)
+        now = now.reporting(cause=fault.cause, code=fault.code)
+        now = now.in_phase(phase, time)
+        return now.logged(time, "stopped", **now.status.stop_data())
 
     def _NextStopped(
         self, context: Context, now: CycleState, follower: FollowerStatus
     ) -> CycleState:
         """Waits until the arm stands; after "abort" retracts it as well."""
-        finished = now.replace(status=now.status.replace(finished=True))
+        finished = now.reporting(finished=True)
         if now.moving:
             return finished if self._Arrived(now, follower) else now
         standing = follower.rate == 0.0 or follower.done or follower.number == 0
@@ -322,13 +233,13 @@ class PaintCycle(LeafSystem):
             return finished
         last = len(self._sequence) - 1
         if now.step != last or now.request.goal != "retract":
-            return now.replace(step=last).asking(PLANNER, "retract")
+            return now.replace(step=last).requesting(PLANNER, "retract")
         result = self._Result(context, PLANNER)
         if result.number != now.request.number:
             return now
-        if result.error is not None:
+        if self._Failure(PLANNER, result) is not None:
             return finished
-        return self._Moving(now, result, context.get_time(), spray=False)
+        return self._Moving(now, result.value, context.get_time(), spray=False)
 
     def _NextStep(
         self, context: Context, now: CycleState, follower: FollowerStatus
@@ -345,16 +256,16 @@ class PaintCycle(LeafSystem):
         if now.moving:
             arrived = self._Arrived(now, follower)
             return self._Entered(now, now.step + 1, time) if arrived else now
-        stage = PLANNER if step.action == Action.MOVE else step.name
         if step.action == Action.PAINT:
             program = self._Result(context, "spray_path_planner").value
-            result = StageResult(number=now.request.number, value=program.motion)
-            return self._Moving(now, result, time, spray=True)
+            return self._Moving(now, program.motion, time, spray=True)
+        stage = PLANNER if step.action == Action.MOVE else step.name
         result = self._Result(context, stage)
         if result.number != now.request.number:
             return now
-        if result.error is not None:
-            return self._Stopped(now, Phase.FAULT, f"{stage}: {result.error}", time)
+        failure = self._Failure(stage, result)
+        if failure is not None:
+            return self._Stopped(now, Phase.FAULT, failure, time)
         now = now.logged(
             time,
             "stage",
@@ -365,31 +276,30 @@ class PaintCycle(LeafSystem):
         if result.warning is not None:
             now = now.logged(time, "warning", stage=stage, warning=result.warning)
         if step.action == Action.MOVE and result.value is not None:
-            return self._Moving(now, result, time, spray=False)
+            return self._Moving(now, result.value, time, spray=False)
         return self._Entered(now, now.step + 1, time)
 
     def _Entered(self, now: CycleState, index: int, time: float) -> CycleState:
         """Returns the state at the beginning of a step, or at the end of all."""
         if index == len(self._sequence):
-            now = now.in_phase(Phase.DONE, time)
-            return now.replace(status=now.status.replace(finished=True))
+            return now.in_phase(Phase.DONE, time).reporting(finished=True)
         step = self._sequence[index]
         now = now.replace(step=index, since=time, moving=False).in_phase(
             step.phase, time
         )
         if step.action == Action.MOVE:
-            return now.asking(PLANNER, step.name)
+            return now.requesting(PLANNER, step.name)
         if step.action == Action.WORK:
-            return now.asking(step.name)
+            return now.requesting(step.name)
         if step.action == Action.REVIEW and self._unattended:
             return self._Entered(now, index + 1, time)
         return now
 
     def _Moving(
-        self, now: CycleState, result: StageResult, time: float, *, spray: bool
+        self, now: CycleState, motion: Motion, time: float, *, spray: bool
     ) -> CycleState:
         command = MotionCommand(
-            number=now.command.number + 1, motion=result.value, rate=1.0, spray=spray
+            number=now.command.number + 1, motion=motion, rate=1.0, spray=spray
         )
         return now.replace(command=command, moving=True, since=time)
 
@@ -397,4 +307,19 @@ class PaintCycle(LeafSystem):
         return follower.number == now.command.number and follower.done
 
     def _Result(self, context: Context, stage: str) -> StageResult:
-        return EvalAs(self._stage_ports[stage], context, StageResult)
+        return EvalAs(self._ports[stage], context, StageResult)
+
+    def _Failure(self, stage: str, result: StageResult) -> Fault | None:
+        """Returns why a result cannot be used, or None."""
+        if result.error is not None:
+            return Fault(
+                f"{stage}: {result.error}", code=result.code or "PNT-CYCLE-017"
+            )
+        answer = STAGES[stage].answer
+        if isinstance(result.value, answer):
+            return None
+        expected = " or ".join(kind.__name__ for kind in answer)
+        return Fault(
+            f"{stage} returned {type(result.value).__name__}, expected {expected}",
+            code="PNT-CYCLE-018",
+        )

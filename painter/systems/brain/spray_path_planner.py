@@ -2,24 +2,21 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from pydrake.common.value import Value
 from pydrake.systems.framework import Context
 
 from painter.errors import PainterError
+from painter.planning.arm.kinematics import NQ
 from painter.planning.config import TileConfig
 from painter.planning.program.program import ProgramPlanner
 from painter.planning.spray_path import PaintProgram, Stroke
 from painter.planning.tile import grid_shape
-from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
-from painter.systems.values import StageResult
 from perception.ground import check_positive
 from perception.values import WallSegmentation
 
 
 class SprayPathPlanner(Stage):
-    """Plans strokes over the wall alone, or takes given ones, and their motion.
+    """Plans strokes over the paintable wall, or takes given ones, and their motion.
 
     .. pydrake_system::
 
@@ -33,7 +30,7 @@ class SprayPathPlanner(Stage):
 
     Ports:
         request: StageRequest; acted on when it names "spray_path_planner" and is new.
-        state: (10,) q and v, rad and rad/s, where the arm stands, at rest.
+        state: (10,) q and v, rad and rad/s, of the arm, at rest.
         segmentation: StageResult of the wall segmenter.
         result: StageResult; its value is a PaintProgram that starts at `state` and ends
             at the home pose.
@@ -54,8 +51,8 @@ class SprayPathPlanner(Stage):
         Args:
             planner: Of the robot and its settings.
             tile: Size that the segmentation must have.
-            period: Time between looks at the request, s.
-            strokes: What is left to be sprayed; None = all of the wall.
+            period: Time between checks for a new request, s.
+            strokes: Those left to spray; None = plan them for the whole wall.
 
         Raises:
             ValueError: A setting is out of bounds.
@@ -67,20 +64,10 @@ class SprayPathPlanner(Stage):
         self._tile = tile
         self._planner = planner
         self._strokes = strokes
-        # Inputs.
-        self._state_port = self.DeclareVectorInputPort("state", 10)
-        self._segmentation_port = self.DeclareAbstractInputPort(
-            "segmentation", Value(StageResult())
-        )
 
-    def _Work(self, context: Context, goal: str) -> PaintProgram:
-        segmentation = EvalAs(self._segmentation_port, context, StageResult).value
-        if not isinstance(segmentation, WallSegmentation):
-            raise PainterError(
-                f"{self.GetSystemPathname()}:segmentation carries no segmentation: "
-                f"none was made yet.",
-                code="PNT-CYCLE-006",
-            )
+    def Work(self, context: Context, goal: str) -> PaintProgram:
+        """Returns the paint program; see `Stage.Work`."""
+        segmentation = self.ReadAnswer(context, "segmentation", WallSegmentation)
         shape = grid_shape(self._tile, segmentation.cell)
         if segmentation.wall_mask.shape != shape:
             raise PainterError(
@@ -88,7 +75,7 @@ class SprayPathPlanner(Stage):
                 f"{segmentation.wall_mask.shape} cells, the tile {shape}.",
                 code="PNT-CYCLE-007",
             )
-        q0 = np.array(self._state_port.Eval(context)[:5])
+        q0 = self.Read(context, "state")[:NQ]
         strokes = self._strokes
         if strokes is None:
             strokes = self._planner.strokes(segmentation)

@@ -1,11 +1,9 @@
-"""The stage that finds the wall at first sight."""
+"""The stage that finds the wall in the first pictures."""
 
 import numpy as np
-from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
-from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
 from painter.systems.values import UP_W
 from perception.config import SegmentationConfig
@@ -29,7 +27,7 @@ class WallFinder(Stage):
 
     Ports:
         request: StageRequest; acted on when it names "wall_finder" and is new.
-        surface_map: SurfaceMap in W, of the first look.
+        surface_map: SurfaceMap in W, of the pictures taken in LOOK.
         result: StageResult; its value is a Wall.
 
     State is the last StageResult.
@@ -52,8 +50,8 @@ class WallFinder(Stage):
             tile: Its size.
             config: Thresholds.
             seed: Of RANSAC's random draws.
-            period: Time between reads of the request, s.
-            mount_limit_deg: A camera found to be tilted by more is warned of.
+            period: Time between checks for a new request, s.
+            mount_limit_deg: The stage warns of a camera tilted by more, deg.
 
         Raises:
             ValueError: A number is not positive or a threshold out of bounds.
@@ -66,23 +64,21 @@ class WallFinder(Stage):
         self._config = config
         self._seed = seed
         self._mount_limit_deg = mount_limit_deg
-        # Inputs.
-        self._map_port = self.DeclareAbstractInputPort(
-            "surface_map", Value(SurfaceMap.empty())
-        )
 
-    def _Warning(self, context: Context) -> str | None:
-        surface_map = EvalAs(self._map_port, context, SurfaceMap)
+    def Warning(self, context: Context) -> str | None:
+        """Warns of a tilted camera mount; see `Stage.Warning`."""
+        surface_map: SurfaceMap = self.Read(context, "surface_map")
         tilt_deg = float(np.degrees(surface_map.mount_tilt))
         if tilt_deg <= self._mount_limit_deg:
             return None
         return (
-            f"the camera's mount is tilted by {tilt_deg:.2f} deg against its model "
-            f"(limit {self._mount_limit_deg:g} deg): calibrate it (painter calibrate)."
+            f"the camera mount is tilted by {tilt_deg:.2f} deg from its model (limit "
+            f"{self._mount_limit_deg:g} deg): calibrate it with `painter calibrate`."
         )
 
-    def _Work(self, context: Context, goal: str) -> Wall:
-        surface_map = EvalAs(self._map_port, context, SurfaceMap)
+    def Work(self, context: Context, goal: str) -> Wall:
+        """Returns the wall that was found; see `Stage.Work`."""
+        surface_map: SurfaceMap = self.Read(context, "surface_map")
         return find_wall(
             surface_map.p_WQs,
             self._X_WT_expected,

@@ -1,12 +1,9 @@
-"""The stage that parts the scanned wall into what to paint and what not."""
+"""The stage that segments the scanned wall into paintable area and the rest."""
 
-from pydrake.common.value import Value
 from pydrake.systems.framework import Context
 
-from painter.errors import PainterError
-from painter.systems.ports import EvalAs
 from painter.systems.stage import Stage
-from painter.systems.values import UP_W, StageResult
+from painter.systems.values import UP_W
 from perception.config import SegmentationConfig
 from perception.ground import check_positive
 from perception.segmentation import segment_wall
@@ -47,9 +44,9 @@ class WallSegmenter(Stage):
 
         Args:
             tile: Its size.
-            config: Thresholds of the six steps.
+            config: Thresholds of the segmentation.
             seed: Of RANSAC's random draws.
-            period: Time between reads of the request, s.
+            period: Time between checks for a new request, s.
 
         Raises:
             ValueError: A number is not positive or a threshold out of bounds.
@@ -60,23 +57,13 @@ class WallSegmenter(Stage):
         self._tile = tile
         self._config = config
         self._seed = seed
-        # Inputs.
-        self._map_port = self.DeclareAbstractInputPort(
-            "surface_map", Value(SurfaceMap.empty())
-        )
-        self._wall_port = self.DeclareAbstractInputPort("wall", Value(StageResult()))
 
-    def _Work(self, context: Context, goal: str) -> WallSegmentation:
-        surface_map = EvalAs(self._map_port, context, SurfaceMap)
-        wall = EvalAs(self._wall_port, context, StageResult).value
-        if not isinstance(wall, Wall):
-            raise PainterError(
-                f"{self.GetSystemPathname()}:wall carries no wall: none was found yet.",
-                code="PNT-CYCLE-008",
-            )
+    def Work(self, context: Context, goal: str) -> WallSegmentation:
+        """Returns the wall's segmentation; see `Stage.Work`."""
+        surface_map: SurfaceMap = self.Read(context, "surface_map")
         return segment_wall(
             surface_map,
-            wall.X_WT,
+            self.ReadAnswer(context, "wall", Wall).X_WT,
             self._tile,
             config=self._config,
             seed=self._seed,

@@ -18,7 +18,7 @@ from painter.canopen.process.robot_clock import Bus, RobotClock
 from painter.errors import BusError
 from painter.planning.arm.kinematics import NQ
 from painter.systems.ports import EvalAs
-from painter.systems.values import ArmStatus, CameraStatus, DriveStatus
+from painter.systems.values import ArmStatus, CameraStatus, DriveStatus, Fault
 from perception.ground import FloatArray, FrozenValue
 
 # How far back samples are read: what the diagram may be behind, and a few cycles.
@@ -55,13 +55,12 @@ class CanopenArm(LeafSystem):
     Ports:
         desired_state: (10,) q, v; rad, rad/s.
         trigger: (1,) 0 to 1 of the nominal flow.
-        camera_status: CameraStatus; a camera that is gone stops the arm. May be left
-            unconnected.
+        camera_status: CameraStatus; a camera fault stops the arm. May be unconnected.
         state_estimated: (10,) measured q, v at the diagram's time; rad, rad/s.
-        status: ArmStatus; why the bus has stopped comes before all else.
+        status: ArmStatus; a stop of the bus comes before drive faults.
 
     State is one ArmReading, replaced every `period` s. Setpoints are sent at the same
-    times, stamped with when they are to be carried out; nothing here waits for the bus.
+    times, stamped with their time of execution. Nothing here waits for the bus.
     """
 
     def __init__(
@@ -131,7 +130,8 @@ class CanopenArm(LeafSystem):
         try:
             report = self._bus.report()
         except BusError as error:
-            after = last.replace(status=last.status.replace(stopped=str(error)))
+            stopped = Fault(str(error), code=error.code)
+            after = last.replace(status=last.status.replace(stopped=stopped))
         else:
             when = self._clock.bus_time(context.get_time())
             samples = self._bus.samples(when - _HISTORY)
@@ -139,7 +139,8 @@ class CanopenArm(LeafSystem):
             if samples.time.size:
                 after = after.replace(state=np.concatenate(samples.at(when)))
             if report is not None:
-                after = after.replace(status=arm_status(report.feedback))
+                camera = self._CameraFault(context)
+                after = after.replace(status=arm_status(report.feedback, camera))
         index = int(self._reading_index)
         state.get_mutable_abstract_state(index).set_value(after)
         return EventStatus.Succeeded()
@@ -156,23 +157,35 @@ class CanopenArm(LeafSystem):
             trigger=0.0 if self._gun_off else trigger,
         )
         try:
-            if self._camera_port.HasValue(context):
-                fault = EvalAs(self._camera_port, context, CameraStatus).fault
-                if fault is not None:
-                    self._bus.stop(fault)
-                    return EventStatus.Succeeded()
-            self._bus.push([point])
+            camera = self._CameraFault(context)
+            if camera is None:
+                self._bus.push([point])
+            else:
+                self._bus.stop(camera)
         except BusError:
             # The next update finds out why, and the brain ends the cycle.
             return EventStatus.DidNothing()
         return EventStatus.Succeeded()
 
+    def _CameraFault(self, context: Context) -> str | None:
+        if not self._camera_port.HasValue(context):
+            return None
+        return EvalAs(self._camera_port, context, CameraStatus).fault
 
-def arm_status(feedback: Feedback) -> ArmStatus:
-    """Returns the bus's feedback as the brain sees it."""
-    stopped = feedback.reason
-    if not stopped and feedback.bus_state != BusState.ENABLED:
-        stopped = f"the bus is {feedback.bus_state}."
+
+def arm_status(feedback: Feedback, camera_fault: str | None = None) -> ArmStatus:
+    """Returns the bus's feedback as the brain sees it.
+
+    Args:
+        feedback: Of the master.
+        camera_fault: Why the camera cannot be used, or None.
+    """
+    stopped = None
+    if feedback.reason and feedback.reason == camera_fault:
+        stopped = Fault(feedback.reason, code="PNT-CYCLE-019")
+    elif feedback.reason or feedback.bus_state != BusState.ENABLED:
+        cause = feedback.reason or f"the bus is {feedback.bus_state}."
+        stopped = Fault(cause, code="PNT-CYCLE-020")
     return ArmStatus(
         drives=tuple(
             DriveStatus(

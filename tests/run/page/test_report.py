@@ -109,11 +109,22 @@ def test_faulty_run_stays_incomplete_and_names_its_cause(
     folder.save_truth(truth)
     folder.log(21.0, "phase", phase="FAULT")
     cause = "spray_path_planner: ReachError: stroke 3 <left>"
-    figures = finish_run(folder, time=21.5, result="FAULT", wall_clock=9.0, cause=cause)
+    figures = finish_run(
+        folder,
+        time=21.5,
+        result="FAULT",
+        wall_clock=9.0,
+        cause=cause,
+        code="PNT-TEST-001",
+    )
+    assert (figures["cause"], figures["code"]) == (cause, "PNT-TEST-001")
+    assert folder.events()[-1]["code"] == "PNT-TEST-001"
     assert figures["mask_iou"] == 1.0
     assert "coverage" not in figures
     assert not folder.is_complete
-    assert (folder.path / files.INCOMPLETE).read_text() == f"FAULT: {cause}\n"
+    assert (folder.path / files.INCOMPLETE).read_text() == (
+        f"FAULT: {cause} [PNT-TEST-001]\n"
+    )
     page = page_of(folder)
     assert "not complete: FAULT in PLAN" in page
     assert "ReachError: stroke 3 &lt;left&gt;" in page

@@ -9,18 +9,31 @@ from pydrake.systems.framework import DiagramBuilder
 
 from painter.errors import ReachError
 from painter.planning.spray_path import Motion, PaintProgram
-from painter.systems.brain.paint_cycle import (
-    KNOWN_WALL_SEQUENCE,
-    SEQUENCE,
-    STAGES,
-    PaintCycle,
-)
+from painter.systems.brain.paint_cycle import PaintCycle
 from painter.systems.brain.path_follower import PathFollower
-from painter.systems.stage import Stage
-from painter.systems.values import ArmStatus, DriveStatus, OperatorCommand, Phase
+from painter.systems.cycle_state import KNOWN_WALL_SEQUENCE, SEQUENCE
+from painter.systems.stage import STAGES, Stage
+from painter.systems.values import (
+    ArmStatus,
+    DriveStatus,
+    Fault,
+    FollowerStatus,
+    OperatorCommand,
+    Phase,
+    StageResult,
+)
+from perception.values import Wall, WallSegmentation
 
 DURATION = 1.0
 SPRAY = (0.3, 0.6)
+WALL = Wall(X_WT=RigidTransform(), rms=0.001, inlier_count=1, inlier_share=1.0)
+SEGMENTATION = WallSegmentation(
+    labels=np.ones((2, 2), dtype=np.uint16),
+    depth=np.zeros((2, 2), dtype=np.float32),
+    wall_mask=np.ones((2, 2), dtype=bool),
+    X_WT=RigidTransform(),
+    cell=0.01,
+)
 
 
 def still_motion(spray_on=()) -> Motion:
@@ -37,10 +50,10 @@ class ScriptedStage(Stage):
     """Answers with a value, by the goal if it has several, or fails."""
 
     def __init__(self, stage: str, answer) -> None:
-        super().__init__(stage=stage, period=0.02)
+        super().__init__(stage=stage, inputs={})
         self._answer = answer
 
-    def _Work(self, context, goal):
+    def Work(self, context, goal):
         answer = self._answer
         if isinstance(answer, dict):
             answer = answer.get(goal, answer["else"])
@@ -64,8 +77,8 @@ class Rig:
         )
         values = {
             "motion_planner": still_motion(),
-            "wall_finder": "wall",
-            "wall_segmenter": "segmentation",
+            "wall_finder": WALL,
+            "wall_segmenter": SEGMENTATION,
             "spray_path_planner": program,
         } | answers
         builder = DiagramBuilder()
@@ -105,14 +118,14 @@ class Rig:
         self.diagram.GetInputPort("state").FixValue(self.context, np.zeros(10))
         self.set("arm_status", ArmStatus())
         self.set("operator", OperatorCommand())
-        self.words = 0
+        self.commands = 0
 
     def set(self, port: str, value) -> None:
         self.diagram.GetInputPort(port).FixValue(self.context, Value(value))
 
-    def say(self, word: str) -> None:
-        self.words += 1
-        self.set("operator", OperatorCommand(self.words, word))
+    def say(self, command: str) -> None:
+        self.commands += 1
+        self.set("operator", OperatorCommand(self.commands, command))
 
     def output(self, system, port: str):
         return system.GetOutputPort(port).Eval(
@@ -229,6 +242,7 @@ def test_abort_closes_the_gun_stands_and_retracts():
     rig.advance_to_end()
     assert rig.phases[-1] == "ABORTED"
     assert "operator" in rig.status.cause
+    assert rig.status.code == "PNT-CYCLE-016"
     # The retract motion ran: HOME, LOOK, SCAN, more looks, PAINT and then the sixth.
     assert rig.output(rig.follower, "status").number == 6
 
@@ -251,13 +265,13 @@ def test_a_stopped_job_knows_with_which_stroke_it_goes_on():
     assert data["next_stroke"] == rig.status.next_stroke
 
 
-def test_a_word_out_of_place_is_logged_as_refused():
+def test_a_command_out_of_place_is_logged_as_refused():
     rig = Rig()
     rig.advance_until(lambda: rig.status.phase == Phase.LOOK)
     rig.say("approve")
     rig.advance_to_end()
     refused = [data for _, name, data in rig.status.events if name == "refused"]
-    assert refused == [{"word": "approve"}]
+    assert refused == [{"command": "approve"}]
     assert rig.phases == ALL
 
 
@@ -268,6 +282,43 @@ def test_failed_stage_ends_in_fault_with_its_cause():
     rig.advance_to_end()
     assert rig.phases == [*ALL[:5], "FAULT"]
     assert rig.status.cause == "spray_path_planner: ReachError: row 3 is out of reach"
+    assert rig.status.code == "PNT-TEST-001"
+    (data,) = (data for _, name, data in rig.status.events if name == "stopped")
+    assert data == {"cause": rig.status.cause, "code": "PNT-TEST-001"}
+
+
+def test_an_answer_of_another_type_ends_in_fault_and_names_both_types():
+    rig = Rig(wall_segmenter=WALL)
+    rig.advance_to_end()
+    assert rig.phases == [*ALL[:4], "FAULT"]
+    assert rig.status.cause == "wall_segmenter returned Wall, expected WallSegmentation"
+    assert rig.status.code == "PNT-CYCLE-018"
+
+
+def test_a_failure_without_a_code_gets_one():
+    dut = PaintCycle(unattended=True, period=0.02, look_time=0.5, time_limit=60.0)
+    simulator = Simulator(dut)
+    context = simulator.get_mutable_context()
+    failed = StageResult(number=1, error="no way home")
+    for port in ("wall_finder", "wall_segmenter", "spray_path_planner"):
+        dut.GetInputPort(port).FixValue(context, Value(StageResult()))
+    dut.GetInputPort("motion_planner").FixValue(context, Value(failed))
+    dut.GetInputPort("arm_status").FixValue(context, Value(ArmStatus()))
+    dut.GetInputPort("follower_status").FixValue(context, Value(FollowerStatus()))
+    simulator.AdvanceTo(0.1)
+    status = dut.GetOutputPort("cycle_status").Eval(context)
+    assert (status.cause, status.code) == (
+        "motion_planner: no way home",
+        "PNT-CYCLE-017",
+    )
+
+
+def test_why_the_body_stopped_comes_before_its_drives():
+    drives = (DriveStatus("FAULT", 0x7500), *(DriveStatus(),) * 4)
+    stopped = Fault("SYNC is late", code="PNT-TEST-002")
+    assert ArmStatus(drives=drives).fault.code == "PNT-CYCLE-014"
+    assert ArmStatus(drives=drives, stopped=stopped).fault is stopped
+    assert ArmStatus().fault is None
 
 
 def test_drive_fault_closes_the_gun_and_stops_the_arm():
@@ -280,6 +331,7 @@ def test_drive_fault_closes_the_gun_and_stops_the_arm():
     rig.advance_to_end()
     assert rig.status.phase == Phase.FAULT
     assert rig.status.cause == "drive 2: FAULT, fault code 0x7500"
+    assert rig.status.code == "PNT-CYCLE-014"
     assert rig.output(rig.follower, "status").rate == 0.0
 
 
@@ -288,3 +340,4 @@ def test_a_cycle_over_its_time_limit_is_a_fault():
     rig.advance_to_end()
     assert rig.status.phase == Phase.FAULT
     assert "8 s" in rig.status.cause
+    assert rig.status.code == "PNT-CYCLE-015"

@@ -64,7 +64,7 @@ def test_program_paints_the_patch_and_leads_from_here_to_home(planner):
 
 
 def test_no_segmentation_is_an_error_result(planner):
-    assert "none was made yet" in ask(planner, StageResult(), HOME).error
+    assert "segmentation holds NoneType" in ask(planner, StageResult(), HOME).error
 
 
 def test_segmentation_of_another_tile_is_an_error_result(planner):

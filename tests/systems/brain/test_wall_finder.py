@@ -68,7 +68,7 @@ def test_a_tilted_mount_is_warned_of_and_the_wall_found():
     tilted = wall_map().replace(mount_tilt=np.deg2rad(0.3))
     result = answer(request, tilted)
     assert isinstance(result.value, Wall)
-    assert "tilted by 0.30 deg against its model (limit 0.1 deg)" in result.warning
+    assert "tilted by 0.30 deg from its model (limit 0.1 deg)" in result.warning
     assert answer(request, tilted, mount_limit_deg=0.35).warning is None
     assert answer(request, wall_map()).warning is None
 

@@ -71,7 +71,7 @@ def test_wall_is_parted_on_its_tile():
 def test_without_a_wall_the_reason_is_named():
     result = answer(StageResult())
     assert result.value is None
-    assert "wall carries no wall" in result.error
+    assert "wall holds NoneType, expected Wall" in result.error
 
 
 def test_other_type_on_a_port_is_named():

@@ -49,7 +49,7 @@ def test_drives_are_operational_until_their_fault_is_due():
     assert port.Eval(context).fault is None
     context.SetTime(2.0)
     status = port.Eval(context)
-    assert status.fault == "drive 3: FAULT, fault code 0x8611"
+    assert status.fault.cause == "drive 3: FAULT, fault code 0x8611"
     assert status.drives[0].following_error == pytest.approx(0.1)
 
 
