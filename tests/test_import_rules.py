@@ -98,6 +98,7 @@ ROOMS: dict[str, set[str]] = {
     "perception.mapping.fusion": {
         "perception.config",
         "perception.depth_camera",
+        "perception.io",
         "perception.mapping.config",
         "perception.mapping.keyframes",
         "perception.values",

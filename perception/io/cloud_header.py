@@ -1,6 +1,8 @@
-"""Headers of PLY and PCD files: which numbers the data hold, and where."""
+"""Headers of cloud files: what numbers a point has; those of PCD.
 
-import re
+The headers of PLY are parsed in `ply.py`.
+"""
+
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,21 +11,6 @@ import numpy as np
 MAX_POINTS = 50_000_000  # 1.2 GB as float64; a wall at 1 mm has 4 million.
 _MAX_HEADER = 65536
 _MAX_POINT_BYTES = 4096
-# Source: Turk, "The PLY polygon file format", 1994, and the names with bit sizes that
-# newer writers use.
-_PLY_TYPES = {
-    **dict.fromkeys(("char", "int8"), "i1"),
-    **dict.fromkeys(("uchar", "uint8"), "u1"),
-    **dict.fromkeys(("short", "int16"), "i2"),
-    **dict.fromkeys(("ushort", "uint16"), "u2"),
-    **dict.fromkeys(("int", "int32"), "i4"),
-    **dict.fromkeys(("uint", "uint32"), "u4"),
-    **dict.fromkeys(("float", "float32"), "f4"),
-    **dict.fromkeys(("double", "float64"), "f8"),
-    "int64": "i8",
-    "uint64": "u8",
-}
-_PLY_FORMS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 # Source: Point Cloud Library, "The PCD file format", version 0.7.
 _PCD_TYPES = {
     **{("I", size): f"<i{size}" for size in (1, 2, 4, 8)},
@@ -53,44 +40,6 @@ class CloudHeader:
     viewpoint: tuple[float, float, float] | None = None
 
 
-def parse_ply(data: bytes) -> CloudHeader:
-    """Reads the header of a PLY file.
-
-    Args:
-        data: The file.
-
-    Returns:
-        The header; what follows the vertices is not looked at.
-
-    Raises:
-        ValueError: The header is damaged or not of points with x, y and z; also
-            KeyError and IndexError, with what was looked for.
-    """
-    if not re.match(rb"ply\s", data):
-        raise ValueError("a PLY file begins with 'ply'")
-    lines, size = _header_lines(data, "end_header")
-    form = ""
-    elements: list[tuple[str, int, list[list[str]]]] = []
-    for words in lines:
-        if words[:1] == ["format"]:
-            form = words[1]
-        elif words[:1] == ["element"]:
-            elements.append((words[1], _count(words[2]), []))
-        elif words[:1] == ["property"]:
-            elements[-1][2].append(words[1:])
-    if not elements or elements[0][0] != "vertex":
-        raise ValueError("the first element is not 'vertex'")
-    if form not in _PLY_FORMS:
-        raise ValueError(f"format {form!r} is unknown")
-    _, count, properties = elements[0]
-    if any(words[0] == "list" for words in properties):
-        raise ValueError("a vertex has a list property")
-    names = [words[1] for words in properties]
-    types = [_PLY_FORMS[form] + _PLY_TYPES[words[0]] for words in properties]
-    point = _point_type(names, types, [1] * len(names))
-    return CloudHeader(count, point, "ascii" if form == "ascii" else "binary", size)
-
-
 def parse_pcd(data: bytes) -> CloudHeader:
     """Reads the header of a PCD file.
 
@@ -102,12 +51,13 @@ def parse_pcd(data: bytes) -> CloudHeader:
         none, counts as none.
 
     Raises:
-        ValueError: As by `parse_ply`.
+        ValueError: The header is damaged or not of points with x, y and z; also
+            KeyError and IndexError, with what was looked for.
     """
-    lines, size = _header_lines(data, "DATA")
+    lines, size = header_lines(data, "DATA")
     fields = {words[0]: words[1:] for words in lines if words}
     sizes = [int(word) for word in fields["SIZE"]]
-    counts = [_count(word) for word in fields.get("COUNT", ["1"] * len(sizes))]
+    counts = [parse_count(word) for word in fields.get("COUNT", ["1"] * len(sizes))]
     kinds = zip(fields["TYPE"], sizes, strict=True)
     types = [_PCD_TYPES[kind, bytes_] for kind, bytes_ in kinds]
     form = fields["DATA"][0]
@@ -116,16 +66,20 @@ def parse_pcd(data: bytes) -> CloudHeader:
     place = [float(word) for word in fields.get("VIEWPOINT", ["0"] * 3)[:3]]
     known = len(place) == 3 and np.isfinite(place).all() and any(place)
     return CloudHeader(
-        _count(fields["POINTS"][0]),
-        _point_type(fields["FIELDS"], types, counts),
+        parse_count(fields["POINTS"][0]),
+        point_type(fields["FIELDS"], types, counts),
         form,
         size,
         (place[0], place[1], place[2]) if known else None,
     )
 
 
-def _header_lines(data: bytes, last: str) -> tuple[list[list[str]], int]:
-    """Returns the words of the header's lines up to one that begins with `last`."""
+def header_lines(data: bytes, last: str) -> tuple[list[list[str]], int]:
+    """Returns the words of the lines up to one that begins with `last`, and their size.
+
+    Raises:
+        ValueError: There is no such line.
+    """
     lines, position = [], 0
     while (end := data.find(b"\n", position, _MAX_HEADER)) >= 0:
         # A comment may be in any code; what matters is ASCII.
@@ -137,17 +91,27 @@ def _header_lines(data: bytes, last: str) -> tuple[list[list[str]], int]:
     raise ValueError(f"there is no line {last!r}")
 
 
-def _count(word: str) -> int:
+def parse_count(word: str) -> int:
+    """Reads a number of points or values; ValueError = not from 0 to MAX_POINTS."""
     count = int(word)
     if not 0 <= count <= MAX_POINTS:
         raise ValueError(f"a count of {count} is not from 0 to {MAX_POINTS}")
     return count
 
 
-def _point_type(
+def point_type(
     names: list[str], types: list[str], counts: list[int]
 ) -> "np.dtype[Any]":
-    """Makes the type of a point; fields of no name of their own get numbers."""
+    """Makes the NumPy type of a point.
+
+    Args:
+        names: Of the fields; those that repeat and PCL's padding get numbers instead.
+        types: NumPy's name of each.
+        counts: Values of each.
+
+    Raises:
+        ValueError: x, y or z is missing or there twice, or a point is too large.
+    """
     missing = [name for name in ("x", "y", "z") if name not in names]
     if missing:
         raise ValueError(f"points have no {', '.join(missing)}")

@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from perception.errors import CloudReadError
 from perception.ground import FloatArray, FrozenValue
-from perception.io.cloud_header import MAX_POINTS, CloudHeader, parse_pcd, parse_ply
+from perception.io.cloud_header import MAX_POINTS, CloudHeader, parse_pcd
 from perception.io.lzf import lzf_decompress
+from perception.io.ply import parse_ply
 
 CLOUD_SUFFIXES = (".ply", ".pcd", ".xyz", ".npy", ".npz")
 _NAMES = ("points", "xyz", "p_WQs")  # Of the array in an NPZ file, if it has several.

@@ -12,9 +12,12 @@ from pydrake.math import RigidTransform
 
 from painter.errors import InputError
 from painter.run.folder.values import Executed, Film, Truth
+from perception.io.clouds import read_fields
+from perception.io.ply import write_ply
 from perception.values import SurfaceMap
 
-_PLY_POINT = np.dtype([(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")])
+_MAP_FIELDS = ("x", "y", "z", "nx", "ny", "nz")
+_MAP_COMMENT = "Painter map: points and normals in the world frame W, m"
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
@@ -85,20 +88,9 @@ def load_truth(path: Path) -> Truth:
 
 def save_map(path: Path, surface_map: SurfaceMap) -> None:
     """Writes the points (m, in W) and normals of a map as binary PLY."""
-    points = np.empty(surface_map.p_WQs.shape[1], dtype=_PLY_POINT)
-    rows = [*surface_map.p_WQs, *surface_map.normals_W]
-    for name, row in zip(_PLY_POINT.names or (), rows, strict=True):
-        points[name] = row
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        "comment Painter map: points and normals in the world frame W, m",
-        f"element vertex {len(points)}",
-        *(f"property float {name}" for name in _PLY_POINT.names or ()),
-        "end_header",
-    ]
-    text = ("\n".join(header) + "\n").encode()
-    write_whole(path, lambda draft: _write(draft, text + points.tobytes()))
+    rows = np.concatenate([surface_map.p_WQs, surface_map.normals_W])
+    fields = dict(zip(_MAP_FIELDS, rows.astype(np.float32), strict=True))
+    write_whole(path, lambda draft: write_ply(draft, fields, comment=_MAP_COMMENT))
 
 
 def load_map(path: Path) -> np.ndarray:
@@ -108,22 +100,9 @@ def load_map(path: Path) -> np.ndarray:
         (3, N) float64, m, in W.
 
     Raises:
-        InputError: The file is not such a map or is cut short.
+        CloudReadError: The file is not such a map or is cut short.
     """
-    head, mark, body = path.read_bytes().partition(b"end_header\n")
-    words = head.decode("ascii", "replace").split()
-    if not mark or "vertex" not in words:
-        raise InputError(
-            f"{path}: not a map of Painter's (no PLY header).", code="PNT-RUN-009"
-        )
-    count = int(words[words.index("vertex") + 1])
-    if len(body) != count * _PLY_POINT.itemsize:
-        raise InputError(
-            f"{path}: {len(body)} bytes of points, expected "
-            f"{count * _PLY_POINT.itemsize} for {count} points.",
-            code="PNT-RUN-010",
-        )
-    points = np.frombuffer(body, dtype=_PLY_POINT)
+    points = read_fields(path)
     return np.stack([points[name].astype(float) for name in "xyz"])
 
 
@@ -142,7 +121,3 @@ def _load(path: Path, names: Sequence[str], optional: Sequence[str] = ()) -> dic
         raise InputError(
             f"{path}: not a readable .npz file ({error}).", code="PNT-RUN-012"
         ) from error
-
-
-def _write(path: Path, content: bytes) -> None:
-    path.write_bytes(content)

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
+from perception.io.ply import write_ply
 from perception.mapping.config import MapperConfig
 from perception.mapping.keyframes.keyframe import BLOCK, Keyframe
 
@@ -105,15 +106,13 @@ def fuse(
 
 def write_map(path: Path, fused: FusedMap) -> None:
     """Writes the points as PLY with normals, colours, counts, frames and variances."""
-    cloud = o3d.t.geometry.PointCloud()
-    tensor = o3d.core.Tensor.from_numpy
-    cloud.point.positions = tensor(np.ascontiguousarray(fused.p_WQs.T))
-    cloud.point.normals = tensor(np.ascontiguousarray(fused.normals_W.T))
-    cloud.point.colors = tensor(np.ascontiguousarray(fused.colors))
-    cloud.point["count"] = tensor(fused.counts[:, None].astype(np.int32))
-    cloud.point["frames"] = tensor(fused.frames[:, None].astype(np.int32))
-    cloud.point["variance"] = tensor(fused.variances[:, None].astype(np.float32))
-    o3d.t.io.write_point_cloud(path, cloud)
+    fields = dict(zip(("x", "y", "z"), fused.p_WQs, strict=True))
+    fields |= dict(zip(("nx", "ny", "nz"), fused.normals_W, strict=True))
+    fields |= dict(zip(("red", "green", "blue"), fused.colors.T, strict=True))
+    fields["count"] = fused.counts.astype(np.int32)
+    fields["frames"] = fused.frames.astype(np.int32)
+    fields["variance"] = fused.variances.astype(np.float32)
+    write_ply(path, fields, comment="Painter map: points and normals in W, m")
 
 
 def write_voxels(path: Path, fused: FusedMap, edge: float) -> int:

@@ -1,6 +1,7 @@
 """Run folders: what they refuse, what they keep, and that nothing looks complete."""
 
 import json
+import struct
 
 import numpy as np
 import open3d as o3d
@@ -85,6 +86,23 @@ def test_map_reads_back_here_and_in_open3d(tmp_path, surface_map):
     cloud = o3d.io.read_point_cloud(str(tmp_path / "map.ply"))
     np.testing.assert_allclose(cloud.points, surface_map.p_WQs.T, atol=3e-7)
     np.testing.assert_allclose(cloud.normals, surface_map.normals_W.T, atol=1e-7)
+
+
+def test_maps_of_earlier_runs_are_read(tmp_path):
+    # As runs have written them since map.ply is part of the run folder.
+    names = ("x", "y", "z", "nx", "ny", "nz")
+    properties = "".join(f"property float {name}\n" for name in names)
+    header = (
+        "ply\nformat binary_little_endian 1.0\n"
+        "comment Painter map: points and normals in the world frame W, m\n"
+        f"element vertex 2\n{properties}end_header\n"
+    )
+    points = struct.pack("<12f", 1.5, -0.25, 2, -1, 0, 0, 1.25, 0.5, 0.75, -1, 0, 0)
+    dut = RunFolder.create(tmp_path, SCENARIO)
+    (tmp_path / "map.ply").write_bytes(header.encode() + points)
+    np.testing.assert_array_equal(
+        dut.map_points(), [[1.5, 1.25], [-0.25, 0.5], [2.0, 0.75]]
+    )
 
 
 def test_values_read_back_as_written(full_folder, segmentation, truth, executed, film):
