@@ -98,6 +98,11 @@ def setting(default: T, unit: str = "", **rule: Any) -> T:
     )
 
 
+def required(unit: str = "", **rule: Any) -> Any:
+    """Makes the field of a config that has no default; see `setting`."""
+    return dataclasses.field(metadata={"rule": Rule(unit=unit, **rule)})
+
+
 def validate(config: Any, owner: str = "") -> None:
     """Checks all values of a config.
 

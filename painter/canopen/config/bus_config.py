@@ -1,12 +1,11 @@
-"""The bus file: what is on the bus, in which units, and what is allowed.
+"""The bus file: nodes of the bus, their units and limits.
 
 `bus_file.load_bus` reads it; `BusConfig.validate` names the field of every error.
 """
 
 import dataclasses
 import enum
-import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from painter.canopen.config.device import DeviceDescription, read_device
@@ -28,21 +27,22 @@ from painter.canopen.protocol.cia402 import (
     QuickStopOption,
     StopOption,
 )
+from perception.settings import Conflict, required, setting, validate
 
 # Source: CiA 301 v4.2.0, 5.3 (bit timing table).
 BITRATES = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
 
 
 class HomingKind(enum.StrEnum):
-    """Who knows where zero is."""
+    """How the zero of an axis is found."""
 
     NONE = "none"  # The encoder is absolute; `zero` holds the offset.
-    DRIVE = "drive"  # The drive's own homing mode finds it.
+    DRIVE = "drive"  # By the homing mode of the drive.
 
 
 @dataclasses.dataclass(kw_only=True)
 class Identity:
-    """Object 1018h; 0 is not checked."""
+    """Expected values of object 1018h; 0 is not checked."""
 
     vendor: int = 0
     product: int = 0
@@ -55,61 +55,77 @@ class Homing:
     """How an axis finds its zero.
 
     Attributes:
-        kind: Who does it.
+        kind: By absolute encoder or by the drive.
         method: 6098h; CiA 402-2 table of homing methods, negative ones are the maker's.
         speed_switch: 6099h:1, rad/s of the axis.
         speed_zero: 6099h:2, rad/s of the axis.
         acceleration: 609Ah, rad/s² of the axis.
         offset: 607Ch, rad of the axis.
-        timeout: Time for the whole homing, s.
+        timeout: Longest time of the whole homing, s.
     """
 
     kind: HomingKind = HomingKind.NONE
-    method: int = 37
-    speed_switch: float = 0.2
-    speed_zero: float = 0.05
-    acceleration: float = 1.0
-    offset: float = 0.0
-    timeout: float = 30.0
+    method: int = setting(37, "1", least=-128, most=37)
+    speed_switch: float = setting(0.2, "rad/s", above=0.0)
+    speed_zero: float = setting(0.05, "rad/s", above=0.0)
+    acceleration: float = setting(1.0, "rad/s2", above=0.0)
+    offset: float = setting(0.0, "rad")
+    timeout: float = setting(30.0, "s", above=0.0)
+
+
+def _option(default: enum.IntEnum) -> int:
+    """Makes the field of an option code; its enumeration holds all legal values."""
+    return setting(
+        int(default), "1", choices=tuple(int(code) for code in type(default))
+    )
 
 
 @dataclasses.dataclass(kw_only=True)
 class Options:
-    """Option codes; see cia402.py. Objects that a drive lacks are reported."""
+    """Option codes; see cia402.py. Objects that a drive lacks are noted.
 
-    quick_stop: int = QuickStopOption.QUICK_STOP_RAMP_AND_HOLD
-    shutdown: int = StopOption.SLOW_DOWN
-    disable: int = StopOption.SLOW_DOWN
-    halt: int = HaltOption.QUICK_STOP_RAMP
-    fault: int = FaultOption.QUICK_STOP_RAMP
-    abort: int = AbortOption.QUICK_STOP
+    Attributes:
+        quick_stop: 605Ah.
+        shutdown: 605Bh.
+        disable: 605Ch.
+        halt: 605Dh.
+        fault: 605Eh.
+        abort: 6007h.
+    """
+
+    quick_stop: int = _option(QuickStopOption.QUICK_STOP_RAMP_AND_HOLD)
+    shutdown: int = _option(StopOption.SLOW_DOWN)
+    disable: int = _option(StopOption.SLOW_DOWN)
+    halt: int = _option(HaltOption.QUICK_STOP_RAMP)
+    fault: int = _option(FaultOption.QUICK_STOP_RAMP)
+    abort: int = _option(AbortOption.QUICK_STOP)
 
 
 @dataclasses.dataclass(kw_only=True)
 class Timeouts:
-    """Times of bring-up and of the watches, s.
+    """Time-outs of bring-up and of the monitors, s.
 
     Attributes:
         boot: From the reset to the boot-up message.
-        sdo: For one answer; each request is tried `sdo_retries` more times.
+        sdo: For the answer to an SDO request.
         sdo_retries: Further tries of a request.
         transition: For one step of the state machine without brake.
         brake: For the step that opens or closes the brake.
         heartbeat: Without a heartbeat of a node (or, in the drives, of the master).
-        tpdo: Without a process data object of a drive.
+        tpdo: Without a TPDO of a drive.
         setpoint: Without a setpoint while moving or spraying.
-        rpdo_cycles: Cycles without a process data object of the master, in the drives.
+        rpdo_cycles: In the drives, cycles without an RPDO of the master.
     """
 
-    boot: float = 2.0
-    sdo: float = 0.1
-    sdo_retries: int = 3
-    transition: float = 0.5
-    brake: float = 1.0
-    heartbeat: float = 0.3
-    tpdo: float = 0.02
-    setpoint: float = 0.05
-    rpdo_cycles: int = 4
+    boot: float = setting(2.0, "s", above=0.0)
+    sdo: float = setting(0.1, "s", above=0.0)
+    sdo_retries: int = setting(3, "1", least=0, most=100)
+    transition: float = setting(0.5, "s", above=0.0)
+    brake: float = setting(1.0, "s", above=0.0)
+    heartbeat: float = setting(0.3, "s", above=0.0)
+    tpdo: float = setting(0.02, "s", above=0.0)
+    setpoint: float = setting(0.05, "s", above=0.0)
+    rpdo_cycles: int = setting(4, "1", least=2, most=1000)
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -119,26 +135,26 @@ class DriveConfig:
     Attributes:
         node_id: 1 to 127.
         eds: EDS or DCF beside the bus file; empty for the full CiA 402 object set.
-        identity: What 1018h must say.
-        counts_per_turn: Encoder counts a turn of the motor.
-        gear: Motor turns a turn of the axis.
+        identity: Expected values of 1018h.
+        counts_per_turn: Encoder counts per turn of the motor.
+        gear: Motor turns per turn of the axis.
         sign: +1 or -1.
         zero: Axis angle at drive position 0, rad.
         velocity_unit: Unit of velocities in the drive.
         acceleration_unit: Unit of accelerations in the drive.
         homing: How it finds its zero.
-        options: What it does at a stop.
-        restore: Whether 1011h is written first, so that nothing is left from before.
-        store: Whether 1010h is written at the end of the configuration.
+        options: How it reacts to stops.
+        restore: Whether defaults are restored (1011h) before the configuration.
+        store: Whether the configuration is stored (1010h) at its end.
     """
 
-    node_id: int
-    counts_per_turn: float
-    gear: float
+    node_id: int = required("1", least=1, most=127)
+    counts_per_turn: float = required("1", above=0.0)
+    gear: float = required("1", above=0.0)
     eds: str = ""
     identity: Identity = dataclasses.field(default_factory=Identity)
-    sign: int = 1
-    zero: float = 0.0
+    sign: int = setting(1, "1", choices=(1, -1))
+    zero: float = setting(0.0, "rad")
     velocity_unit: VelocityUnit = VelocityUnit.COUNTS_PER_S
     acceleration_unit: AccelerationUnit = AccelerationUnit.COUNTS_PER_S2
     homing: Homing = dataclasses.field(default_factory=Homing)
@@ -164,50 +180,50 @@ class IoConfig:
 
     Attributes:
         node_id: 1 to 127.
-        identity: What 1018h must say.
+        identity: Expected values of 1018h.
         valve_bit: Bit of 6200h:1 that opens the gun.
         estop_bit: Bit of 6000h:1 that is 1 while the e-stop chain is closed.
         flow_full_scale: Value of 6411h:1 at nominal flow.
         pressure_scale: Pressure of the pump at one count of 6401h:1, Pa.
         pressure_low: Pressure below which spraying stops the arm, Pa.
-        deadline: Time without a word of the master after which the node closes the gun
-            by itself, s; whole milliseconds. The master says it twice a cycle.
+        deadline: Time without an RPDO after which the node closes the gun by itself, s;
+            whole milliseconds. The master sends two a cycle.
     """
 
-    node_id: int = 6
+    node_id: int = setting(6, "1", least=1, most=127)
     identity: Identity = dataclasses.field(default_factory=Identity)
-    valve_bit: int = 0
-    estop_bit: int = 0
-    flow_full_scale: int = 32767
-    pressure_scale: float = 1000.0
-    pressure_low: float = 0.0
-    deadline: float = 0.005
+    valve_bit: int = setting(0, "1", least=0, most=7)
+    estop_bit: int = setting(0, "1", least=0, most=7)
+    flow_full_scale: int = setting(32767, "1", least=1, most=32767)
+    pressure_scale: float = setting(1000.0, "Pa")
+    pressure_low: float = setting(0.0, "Pa")
+    deadline: float = setting(0.005, "s", above=0.0, most=60.0)
 
 
 @dataclasses.dataclass(kw_only=True)
 class BusConfig:
-    """The bus and all on it.
+    """The bus and its nodes.
 
     Attributes:
         drives: One drive an axis, by the names of `units.AXES`.
         joints: Limits by the names of `units.JOINTS`, SI units.
         interface: A python-can interface, or "local" for a socket on this machine.
         channel: The interface's channel, e.g. can0, or the socket's path.
-        bitrate: Bits a second; the load is computed with it.
+        bitrate: Bits per second; the bus load is computed with it.
         cycle: Time between two SYNCs, s; whole milliseconds up to 50.
         master_id: Node-ID of the master's heartbeat.
         io: The I/O node.
-        timeouts: Times of bring-up and of the watches.
-        path: The file it came from; EDS files are looked for beside it.
+        timeouts: Of bring-up and of the monitors.
+        path: The bus file; paths of EDS files are relative to its folder.
     """
 
     drives: dict[str, DriveConfig]
     joints: dict[str, JointLimits]
     interface: str = "socketcan"
     channel: str = "can0"
-    bitrate: int = 1_000_000
-    cycle: float = 0.005
-    master_id: int = 127
+    bitrate: int = setting(1_000_000, "bit/s", choices=BITRATES)
+    cycle: float = setting(0.005, "s", least=0.001, most=0.05)
+    master_id: int = setting(127, "1", least=1, most=127)
     io: IoConfig = dataclasses.field(default_factory=IoConfig)
     timeouts: Timeouts = dataclasses.field(default_factory=Timeouts)
     path: str = ""
@@ -244,44 +260,26 @@ class BusConfig:
         """
         _check_names("drives", self.drives, AXES)
         _check_names("joints", self.joints, JOINTS)
-        if self.bitrate not in BITRATES:
-            raise ValueError(f"bitrate must be one of {BITRATES}, got {self.bitrate}.")
-        milliseconds = self.cycle * 1e3
-        if not 1.0 <= milliseconds <= 50.0 or abs(milliseconds % 1.0) > 1e-9:
-            raise ValueError(
-                f"cycle must be whole milliseconds, 0.001 to 0.05 s, got {self.cycle}."
-            )
+        validate(self)
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Checks fields against each other."""
+        if abs(self.cycle * 1e3 % 1.0) > 1e-9:
+            yield "cycle", "whole milliseconds", self.cycle
         ids = {"master_id": self.master_id, "io.node_id": self.io.node_id}
         ids |= {f"drives.{name}.node_id": d.node_id for name, d in self.drives.items()}
         seen: dict[int, str] = {}
         for field, node_id in ids.items():
-            _check_range(field, node_id, 1, 127)
             if node_id in seen:
-                raise ValueError(f"{field} is {node_id}, as is {seen[node_id]}.")
+                yield field, f"other than {seen[node_id]}", node_id
             seen[node_id] = field
-        for name, drive in self.drives.items():
-            _check_drive(f"drives.{name}", drive)
-        for name, limits in self.joints.items():
-            _check_joint(f"joints.{name}", limits)
-        for name in (f.name for f in dataclasses.fields(Timeouts)):
-            if name not in ("sdo_retries", "rpdo_cycles"):
-                _check_positive(f"timeouts.{name}", getattr(self.timeouts, name))
-        _check_range("timeouts.sdo_retries", self.timeouts.sdo_retries, 0, 100)
-        _check_range("timeouts.rpdo_cycles", self.timeouts.rpdo_cycles, 2, 1000)
         least = self.cycle / 2.0 + 0.002  # Timers of nodes tick each millisecond.
-        if not least <= self.io.deadline <= 60.0:
-            raise ValueError(
-                f"io.deadline must be {least:g} to 60 s (half a cycle and 2 ms), "
-                f"got {self.io.deadline!r}."
-            )
-        _check_range("io.valve_bit", self.io.valve_bit, 0, 7)
-        _check_range("io.estop_bit", self.io.estop_bit, 0, 7)
-        _check_range("io.flow_full_scale", self.io.flow_full_scale, 1, 32767)
+        if self.io.deadline < least:
+            bound = f">= {least:g} s, half a cycle and 2 ms"
+            yield "io.deadline", bound, self.io.deadline
         if self.timeouts.tpdo < 2.0 * self.cycle:
-            raise ValueError(
-                f"timeouts.tpdo must be >= 2 cycles, {2.0 * self.cycle:g} s, "
-                f"got {self.timeouts.tpdo:g}."
-            )
+            bound = f">= 2 cycles, {2.0 * self.cycle:g} s"
+            yield "timeouts.tpdo", bound, self.timeouts.tpdo
 
 
 def _check_names(field: str, given: Collection[str], wanted: tuple[str, ...]) -> None:
@@ -291,49 +289,3 @@ def _check_names(field: str, given: Collection[str], wanted: tuple[str, ...]) ->
         raise ValueError(f"{field}.{missing[0]} is missing.")
     if extra:
         raise ValueError(f"{field}.{extra[0]} is unknown; known: {', '.join(wanted)}.")
-
-
-def _check_range(field: str, value: int, low: int, high: int) -> None:
-    if not low <= value <= high:
-        raise ValueError(f"{field} must be {low} to {high}, got {value}.")
-
-
-def _check_positive(field: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{field} must be > 0, got {value!r}.")
-
-
-def _check_drive(field: str, drive: DriveConfig) -> None:
-    _check_positive(f"{field}.counts_per_turn", drive.counts_per_turn)
-    _check_positive(f"{field}.gear", drive.gear)
-    if drive.sign not in (-1, 1):
-        raise ValueError(f"{field}.sign must be 1 or -1, got {drive.sign!r}.")
-    if not math.isfinite(drive.zero):
-        raise ValueError(f"{field}.zero must be finite, got {drive.zero!r}.")
-    _check_range(f"{field}.homing.method", drive.homing.method, -128, 37)
-    for name in ("speed_switch", "speed_zero", "acceleration", "timeout"):
-        _check_positive(f"{field}.homing.{name}", getattr(drive.homing, name))
-    kinds = {
-        "quick_stop": QuickStopOption,
-        "shutdown": StopOption,
-        "disable": StopOption,
-        "halt": HaltOption,
-        "fault": FaultOption,
-        "abort": AbortOption,
-    }
-    for name, kind in kinds.items():
-        value = getattr(drive.options, name)
-        if value not in list(kind):
-            allowed = ", ".join(str(int(option)) for option in kind)
-            raise ValueError(
-                f"{field}.options.{name} must be one of {allowed}; got {value}."
-            )
-
-
-def _check_joint(field: str, limits: JointLimits) -> None:
-    if not limits.q_min < limits.q_max:
-        raise ValueError(
-            f"{field}.q_min must be < q_max {limits.q_max!r}, got {limits.q_min!r}."
-        )
-    for name in ("v_max", "a_max", "stop", "following_error"):
-        _check_positive(f"{field}.{name}", getattr(limits, name))

@@ -1,29 +1,28 @@
 """Joint units to drive units and back: gear, sign, encoder, and the wrist's coupling.
 
-Joints are what the rest of Painter knows: base yaw, shoulder, elbow and wrist pitch,
-wrist yaw. Axes are what the drives turn, counted after the gear: the first three joints
-and the left and right shaft of the wrist's differential.
+Joints are those of the arm model: base yaw, shoulder, elbow and wrist pitch, wrist yaw.
+Axes are the output shafts of the drives' gears: the first three joints, and the left
+and right shaft of the wrist's differential.
 
-Drive limits are boxes, one interval an axis, while the differential turns the joints'
-box into a diamond. Which box stands for it:
+Drive limits are boxes, one interval an axis, while the differential maps the joints'
+box to a diamond. These boxes replace it:
 
-- positions (607Dh), speeds (607Fh, 6080h) and acceleration (60C5h) take the smallest
-  box that holds every state the joints may have, so a drive never refuses a permitted
-  motion; joint states outside that the box lets pass are stopped by the host, which
-  clamps in joint space;
-- the following error window (6065h) and the quick stop ramp (6085h) take the largest
-  box inside, so that two axes at their bounds never add up to more at a joint than the
-  joint's own bound.
+- positions (607Dh), speeds (607Fh, 6080h) and acceleration (60C5h): the smallest
+  enclosing box, so that a drive never rejects a permitted motion. The host clips in
+  joint space, which excludes the corners of the box;
+- the following error window (6065h) and the quick stop ramp (6085h): the largest
+  inscribed box, so that two axes at their bounds never exceed the bound of a joint.
 """
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from perception.ground import FloatArray
+from perception.settings import Conflict, required
 
 JOINTS = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_pitch", "wrist_yaw")
 AXES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_left", "wrist_right")
@@ -40,14 +39,14 @@ _TURN = 2.0 * math.pi
 
 
 class VelocityUnit(enum.StrEnum):
-    """Units that drives give velocities in."""
+    """Units of velocities in a drive."""
 
     COUNTS_PER_S = "counts/s"
     RPM = "rpm"
 
 
 class AccelerationUnit(enum.StrEnum):
-    """Units that drives give accelerations in."""
+    """Units of accelerations in a drive."""
 
     COUNTS_PER_S2 = "counts/s2"
     RPM_PER_S = "rpm/s"
@@ -60,7 +59,7 @@ class AxisUnits:
     Attributes:
         counts_per_turn: Encoder counts a turn of the motor.
         gear: Motor turns a turn of the axis.
-        sign: +1 if both turn the same way, -1 if not.
+        sign: +1 if motor and axis turn in the same sense, -1 if not.
         zero: Axis angle at drive position 0, rad.
         velocity: Unit of velocities.
         acceleration: Unit of accelerations.
@@ -75,7 +74,7 @@ class AxisUnits:
 
     @property
     def counts_per_rad(self) -> float:
-        """Counts a radian of the axis, without sign."""
+        """Counts per radian of the axis, without sign."""
         return self.counts_per_turn * self.gear / _TURN
 
     def counts(self, angle: float) -> int:
@@ -100,7 +99,7 @@ class AxisUnits:
 
     @property
     def rpm_per_rad_s(self) -> float:
-        """Motor turns a minute per rad/s of the axis."""
+        """Motor speed in rpm per rad/s of the axis."""
         return self.gear * 60.0 / _TURN
 
     def speed(self, value: float) -> float:
@@ -113,21 +112,25 @@ class JointLimits:
     """Bounds of one joint.
 
     Attributes:
-        q_min: Lowest position, rad.
-        q_max: Highest position, rad.
-        v_max: Greatest speed, rad/s.
-        a_max: Greatest acceleration of planned motions, rad/s².
+        q_min: Lower position limit, rad.
+        q_max: Upper position limit, rad.
+        v_max: Speed limit, rad/s.
+        a_max: Acceleration limit of planned motions, rad/s².
         stop: Deceleration of any stop, rad/s².
-        following_error: Difference of commanded and actual position that is a fault,
-            rad.
+        following_error: Following error that is a fault, rad.
     """
 
-    q_min: float
-    q_max: float
-    v_max: float
-    a_max: float
-    stop: float
-    following_error: float
+    q_min: float = required("rad")
+    q_max: float = required("rad")
+    v_max: float = required("rad/s", above=0.0)
+    a_max: float = required("rad/s2", above=0.0)
+    stop: float = required("rad/s2", above=0.0)
+    following_error: float = required("rad", above=0.0)
+
+    def conflicts(self) -> Iterator[Conflict]:
+        """Checks the limits against each other."""
+        if not self.q_min < self.q_max:
+            yield "q_min", f"< q_max {self.q_max!r}", self.q_min
 
 
 @dataclass(frozen=True)
@@ -164,14 +167,14 @@ def joints_from_axes(axes: FloatArray) -> FloatArray:
 def drive_limits(
     joints: Sequence[JointLimits], units: Sequence[AxisUnits]
 ) -> list[DriveLimits]:
-    """Turns the joints' limits into the drives'.
+    """Converts joint limits to drive limits.
 
     Args:
         joints: Limits in the order of `JOINTS`.
         units: Units of the drives in the order of `AXES`.
 
     Returns:
-        Limits in the order of `AXES`; the module says which boxes they are.
+        Limits in the order of `AXES`; see the module for the boxes.
 
     Source: CiA 402-2 v4.0.0, objects 607Dh, 607Fh, 6080h (r/min), 60C5h, 6085h, 6065h.
     """
@@ -199,7 +202,7 @@ def drive_limits(
 
 
 def _enclosing_box(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Interval arithmetic: least and greatest axis values over the joints' box."""
+    """Interval arithmetic: range of axis values over the joints' box."""
     middle, half = (low + high) / 2.0, (high - low) / 2.0
     centre = COUPLING @ middle
     reach = np.abs(COUPLING) @ half

@@ -45,8 +45,8 @@ def test_the_robots_bus_loads_with_the_models_limits():
             "base_yaw.gear must be > 0",
         ),
         (lambda f: f["drives"]["base_yaw"].update(gear="a"), "gear must be a number"),
-        (lambda f: f["drives"]["base_yaw"].update(sign=2), "sign must be 1 or -1"),
-        (lambda f: f["drives"]["base_yaw"].update(node_id=2), "as is"),
+        (lambda f: f["drives"]["base_yaw"].update(sign=2), "sign must be one of 1, -1"),
+        (lambda f: f["drives"]["base_yaw"].update(node_id=2), "must be other than"),
         (lambda f: f["drives"]["base_yaw"].update(node_id=200), "must be 1 to 127"),
         (lambda f: f["drives"]["base_yaw"].pop("gear"), "base_yaw.gear is missing"),
         (
