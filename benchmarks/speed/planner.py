@@ -21,7 +21,7 @@ import numpy as np
 
 from painter.config import load_scenario
 from painter.cycle.true_wall import true_segmentation
-from painter.planning.program import program, stroke_links
+from painter.planning.program import connect_strokes, program
 from painter.planning.program.program import ProgramPlanner
 from painter.planning.strokes import raster
 from painter.robot.planners import MakeProgramPlanner
@@ -34,8 +34,8 @@ STAGES: dict[str, tuple[Any, str]] = {
     "cut-ins": (raster, "find_cut_ins"),
     "fit": (raster.FilmFit, "fit"),
     "cut back": (program, "clear_strokes"),
-    "order": (stroke_links, "order_strokes"),
-    "links": (stroke_links, "_linked"),
+    "order": (connect_strokes, "order_strokes"),
+    "transitions": (connect_strokes, "join_all"),
     "verify": (program, "verify_motion"),
     "verify strokes": (program, "verify_strokes"),
 }

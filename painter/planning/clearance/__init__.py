@@ -1,4 +1,4 @@
-"""What the arm must keep clear of, and quick proofs that it does.
+"""Obstacles, and checks that the arm keeps clear of them.
 
-Obstacles, the separating-axis prefilter, the tool beside what stands out. No motion.
+The boxes, the separating-axis prefilter, the tool beside what stands out. No motion.
 """

@@ -1,4 +1,4 @@
-"""What stands in the way: the wall and what was mapped on it, as boxes in W."""
+"""Obstacles as boxes in T, the wall among them, and clearance from them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from pydrake.planning import CollisionChecker
 from scipy import ndimage
 
 from painter.errors import CollisionError
-from painter.planning.clearance.separation import SeparatingAxisPrefilter
+from painter.planning.clearance.prefilter import SeparatingAxisPrefilter
 from perception.ground import BoolArray, FloatArray, FrozenValue
 from perception.values import WallSegmentation
 
@@ -19,8 +19,8 @@ _MIN_HEIGHT = 0.01  # m; lower things are within the wall's own unevenness.
 _MIN_FILL = 0.6  # A region that fills less of its box is split into two boxes.
 _WALL_THICKNESS = 0.10  # m, behind T z = 0.
 _WALL_BORDER = 1.0  # m of wall expected around the tile.
-_FEW = 8  # Of so many places along a motion one is looked at first.
-_INFLUENCE = 0.1  # m, how far the nearest pair is looked for when reporting.
+_FEW = 8  # Every so many-th configuration of a motion is checked first.
+_INFLUENCE = 0.1  # m, within which the nearest pair is searched for a report.
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class ObstacleBox(FrozenValue):
     """A box in front of (or behind) the wall, its edges along T's axes.
 
     Attributes:
-        name: What it stands for.
+        name: Of the obstacle, for messages.
         lower: (3,) m, in T.
         upper: (3,) m, in T.
     """
@@ -39,12 +39,12 @@ class ObstacleBox(FrozenValue):
 
 
 def wall_box(width: float, height: float, *, keepout: float = 0.0) -> ObstacleBox:
-    """Makes the box of the wall and of a layer before it that stays free.
+    """Makes the box of the wall and of a layer in front of it that stays free.
 
     Args:
         width: Of the tile, m.
         height: Of the tile, m.
-        keepout: Thickness of the layer before the wall that is not to be entered, m.
+        keepout: Thickness of the layer, m.
     """
     return ObstacleBox(
         "wall",
@@ -54,11 +54,11 @@ def wall_box(width: float, height: float, *, keepout: float = 0.0) -> ObstacleBo
 
 
 def segmentation_boxes(segmentation: WallSegmentation) -> tuple[ObstacleBox, ...]:
-    """Turns a segmentation into boxes: the wall, and what stands out of it.
+    """Turns a segmentation into boxes: the wall first, then what stands out of it.
 
-    Cells that were not seen count as wall. Each connected region more than 1 cm before
-    the wall becomes one box or several that together cover it, as high as its highest
-    cell.
+    Cells that were not seen count as wall. Each connected region more than 1 cm in
+    front of the wall becomes one box or several that together cover it, as high as
+    its highest cell.
 
     Args:
         segmentation: Labelled grid; depth along T z, m.
@@ -114,10 +114,10 @@ def _cover(filled: BoolArray) -> list[tuple[int, int, int, int]]:
 
 
 class ClearSpace:
-    """Answers whether the arm keeps its clearance from everything that is known.
+    """Checks that the arm keeps its clearance from all known obstacles.
 
-    It clones the checker that it is given, so that boxes of one wall never stay for
-    the next one.
+    It clones the given checker, so that the boxes of one wall are not kept for the next
+    one.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class ClearSpace:
         self.clearance = clearance
         self.boxes = tuple(boxes)
         self._checker = checker.Clone()
-        # The checker knows one distance from all that is fixed in W: the boxes grow by
+        # The checker has one padding for all that is fixed in W, so the boxes grow by
         # the difference.
         self._floor_clearance = floor_clearance
         grown = 2.0 * (clearance - floor_clearance)
@@ -157,10 +157,10 @@ class ClearSpace:
             )
             assert added, box.name
         self._checker.SetPaddingAllRobotEnvironmentPairs(floor_clearance)
-        self._separation = SeparatingAxisPrefilter(self._checker, X_WT)
+        self._prefilter = SeparatingAxisPrefilter(self._checker, X_WT)
 
     def free(self, q: FloatArray, *, slack: float = 0.0) -> BoolArray:
-        """Tells which configurations keep clear.
+        """Returns which configurations keep clear.
 
         Args:
             q: (n, 5) rad.
@@ -169,27 +169,27 @@ class ClearSpace:
         Returns:
             (n,) bool.
         """
-        free = self._proven(q, slack)
+        free = self._prefiltered(q, slack)
         free[~free] = self._checked(q[~free], slack)
         return free
 
     def all_free(self, q: FloatArray) -> bool:
         """Returns whether all configurations q (n, 5) keep clear.
 
-        A few along the way are looked at before those between them: what blocks a
-        motion mostly blocks a stretch of it.
+        A few along the way are checked before those between them: an obstacle mostly
+        blocks a whole stretch of a motion.
         """
         few = np.zeros(len(q), dtype=bool)
         few[::_FEW] = True
-        doubtful = ~self._proven(q)
-        return all(self._checked(q[doubtful & some]).all() for some in (few, ~few))
+        remaining = ~self._prefiltered(q)
+        return all(self._checked(q[remaining & some]).all() for some in (few, ~few))
 
-    def _proven(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
-        """Tells which configurations plainly keep clear; see `free`."""
-        return self._separation.surely_clear(q, self._floor_clearance - slack)
+    def _prefiltered(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
+        """Returns which configurations the prefilter proves clear; see `free`."""
+        return self._prefilter.passes(q, self._floor_clearance - slack)
 
     def _checked(self, q: FloatArray, slack: float = 0.0) -> BoolArray:
-        """Tells which configurations keep clear, one by one; see `free`."""
+        """Returns which configurations the checker finds clear; see `free`."""
         if not len(q):
             return np.zeros(0, dtype=bool)
         self._checker.SetPaddingAllRobotEnvironmentPairs(self._floor_clearance - slack)
@@ -199,7 +199,7 @@ class ClearSpace:
         return np.array(answers, dtype=bool)
 
     def worst_pair(self, q: FloatArray) -> str:
-        """Names the two bodies at q (5,) that are nearest for what they should keep."""
+        """Names the two bodies at q (5,) that lack most of their clearance."""
         found = self._checker.CalcRobotClearance(np.asarray(q, float), _INFLUENCE)
         lacking = np.asarray(found.distances())  # Padding is taken off already.
         if lacking.size == 0:
@@ -213,7 +213,7 @@ class ClearSpace:
     def require(
         self, q: FloatArray, time: FloatArray, *, what: str, slack: float = 0.0
     ) -> None:
-        """Raises if a sampled motion comes too near to anything.
+        """Raises if a sampled motion comes too near to an obstacle.
 
         Args:
             q: (n, 5) rad.
@@ -222,13 +222,13 @@ class ClearSpace:
             slack: Taken off every clearance, m.
 
         Raises:
-            CollisionError: Names time, bodies, what they lack and the clearance.
+            CollisionError: Names time, bodies, the lacking distance and the clearance.
         """
-        doubtful = np.flatnonzero(~self._proven(q, slack))
+        remaining = np.flatnonzero(~self._prefiltered(q, slack))
         begin, count = 0, 1
-        while begin < len(doubtful):
-            # Of a motion that is blocked the first such place is mostly soon found.
-            rows = doubtful[begin : begin + count]
+        while begin < len(remaining):
+            # In a blocked motion the first blocked place mostly comes early.
+            rows = remaining[begin : begin + count]
             free = self._checked(q[rows], slack)
             if not free.all():
                 first = int(rows[np.argmin(free)])

@@ -1,7 +1,7 @@
 """How near to the wall the gun may come beside what stands out of it.
 
-With the gun square to the wall everything that moves with the nozzle lies where it lies
-against it: the least stand-offs over boxes follow without asking for a single pose.
+With the gun square to the wall the tool keeps its place relative to the nozzle, so the
+least stand-offs beside boxes follow without solving for a single pose.
 """
 
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ _R_TG = RotationMatrix(np.diag([1.0, -1.0, -1.0]))
 
 
 def tool_boxes(checker: CollisionChecker) -> tuple[ObstacleBox, ...]:
-    """Returns boxes around what moves with the nozzle.
+    """Returns boxes around the bodies that move with the nozzle.
 
     Args:
         checker: Of the robot's cell.
 
     Returns:
-        One for each shape of a body that is fixed to it; from the nozzle, along T's
-        axes when the gun is square to the wall, m.
+        One for each shape of a body that is fixed to the nozzle: relative to the
+        nozzle, along T's axes when the gun is square to the wall, m.
     """
     plant = checker.plant()
     inspector = checker.model().scene_graph().model_inspector()
@@ -67,12 +67,12 @@ def standoffs_beside(
         obstacles: On the wall, in T.
         tool: As `tool_boxes` returns them.
         clearance: Least distance, m.
-        run_out: Where the nozzle passes as it stops beyond a stroke's end, which may be
-            anywhere: m along T y and away from the wall.
+        run_out: Where the nozzle passes as it stops beyond the end of a stroke: m along
+            T y and away from the wall. A stroke may end anywhere.
 
     Returns:
-        (ny, nx) m; -inf where no part of the tool is near any box. It holds for all
-        of a cell around each place, and for a stroke that ends in the next one.
+        (ny, nx) m; -inf where no part of the tool is near any box. It holds for the
+        whole cell around each place, and for a stroke that ends in the next one.
     """
     aside = clearance + max(np.diff(x).max(), np.diff(y).max())
     least = np.full((y.size, x.size), -np.inf)

@@ -1,4 +1,4 @@
-"""Strokes cut back to where the gun keeps clear and the arm reaches."""
+"""Cuts strokes back to where the gun keeps clear and the arm reaches."""
 
 from collections.abc import Sequence
 
@@ -10,37 +10,37 @@ from painter.planning.spray_path import SkippedStroke, Stroke
 from painter.planning.strokes.film_fit import LEAST_FLOW
 from perception.ground import BoolArray, FloatArray
 
-_STEP = 0.03  # m along a stroke, between the places that are looked at.
-# m, cut off a stroke before an obstacle that the gun cannot pass under its clearance:
-# the room in which the arm stops and turns at 0.6 m/s.
+_STEP = 0.03  # m along a stroke, between the places that are checked.
+# m, cut off a stroke before an obstacle that the gun cannot pass with its clearance:
+# the arm stops and turns there at 0.6 m/s.
 _STOPPING = 0.12
-# m beyond a stroke's end and away from the wall: where the arm stops, and on the way.
+# m beyond a stroke's end and m away from the wall: where the arm stops, and half way.
 RUN_OUT = ((0.10, 0.03), (0.05, 0.01))
 _SLOWER = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)  # Shares of a stroke's speed, in turn.
 _TOO_BENT = "the wall's surface bends too sharply for the joints at this speed"
-# Share of the strokes' length; if more is out of reach the arm stands in the wrong
-# place. A touch-up also finds what the job itself could not reach: it mends the rest.
+# Share of the strokes' length; if more is out of reach the base is in the wrong place.
+# A touch-up also finds what the job itself could not reach: it sprays the rest.
 _MOST_OUT_OF_REACH = 0.05
 
 
 def clear_strokes(
     strokes: Sequence[Stroke], transitions: TransitionPlanner, min_stroke: float
 ) -> tuple[list[Stroke], list[SkippedStroke]]:
-    """Cuts strokes back to what keeps clear.
+    """Cuts strokes back to their feasible parts.
 
     On a wall that is not flat, strokes that the joints cannot follow are slowed first.
 
     Args:
         strokes: In T.
-        transitions: Knows reach and clearance.
-        min_stroke: Shorter ones are not kept, m.
+        transitions: Gives reach and clearance.
+        min_stroke: Shorter parts are skipped, m.
 
     Returns:
-        What stays, and what does not with the reason.
+        The parts that are kept, and those that are skipped with the reason.
 
     Raises:
-        ReachError: More than a twentieth of their length is out of the arm's reach, or
-            of touch-ups all.
+        ReachError: More than a twentieth of the strokes' length is out of the arm's
+            reach; of touch-ups, all of it.
     """
     if not strokes:
         return [], []
@@ -48,7 +48,7 @@ def clear_strokes(
         strokes = [_slowed(stroke, transitions) for stroke in strokes]
     shares = [_shares(stroke) for stroke in strokes]
     counts = [share.size for share in shares]
-    # All at once: to ask for one place takes as long as to ask for fifty.
+    # All at once: checking one place takes as long as checking fifty.
     p_TGs = np.concatenate(
         [
             nozzle_points(
@@ -92,14 +92,14 @@ def clear_strokes(
 
 
 def has_run_out(strokes: Sequence[Stroke], transitions: TransitionPlanner) -> BoolArray:
-    """Tells beyond which strokes the gun has room to come to a stand, as they go.
+    """Returns beyond which strokes the gun has room to stop.
 
     Args:
-        strokes: In T.
-        transitions: Knows reach and clearance.
+        strokes: In T, in their direction of travel.
+        transitions: Gives reach and clearance.
 
     Returns:
-        (n,) bool; where it is True, to look for the move itself is hardly ever in vain.
+        (n,) bool; where it is True, a transition from the stroke hardly ever fails.
     """
     if not strokes:
         return np.zeros(0, dtype=bool)
@@ -118,15 +118,15 @@ def has_run_out(strokes: Sequence[Stroke], transitions: TransitionPlanner) -> Bo
 
 
 def _shares(stroke: Stroke) -> FloatArray:
-    """Returns the shares (n,) of a stroke's length at which it is looked at."""
+    """Returns the shares (n,) of a stroke's length at which it is checked."""
     return np.linspace(0.0, 1.0, max(2, int(np.ceil(stroke.length / _STEP)) + 1))
 
 
 def _slowed(stroke: Stroke, transitions: TransitionPlanner) -> Stroke:
     """Slows a stroke until the joints can follow it over a bent wall.
 
-    Its flow falls by as much, so that its film stays. A stroke that half its speed does
-    not help is returned as it was.
+    Its flow falls by the same share, so that its film stays. A stroke that is too fast
+    even at half its speed is returned unchanged.
     """
     for factor in _SLOWER:
         slower = stroke.replace(speed=factor * stroke.speed, flow=factor * stroke.flow)
@@ -137,7 +137,7 @@ def _slowed(stroke: Stroke, transitions: TransitionPlanner) -> Stroke:
 
 
 def _keeps_rates(stroke: Stroke, transitions: TransitionPlanner) -> BoolArray:
-    """Tells of a stroke's places (n,) where the joints can follow it at its speed."""
+    """Returns at which places (n,) of a stroke the joints can follow its speed."""
     travel = stroke.end_T - stroke.start_T
     p_TGs = nozzle_points(
         stroke.start_T + np.outer(_shares(stroke), travel), stroke.standoff
@@ -159,19 +159,19 @@ def _cut_back(
     transitions: TransitionPlanner,
     min_stroke: float,
 ) -> tuple[list[Stroke], list[SkippedStroke]]:
-    """Returns what stays of a stroke that is free at some of evenly spaced places."""
+    """Splits a stroke, free at some of its places, into kept and skipped parts."""
     share = np.linspace(0.0, 1.0, len(free))
-    room = _STOPPING / stroke.length
+    stopping = _STOPPING / stroke.length
     clear: list[Stroke] = []
     skipped: list[SkippedStroke] = []
     for first, last, is_free in _runs(free):
         cut_start, cut_end = first > 0, last < len(free) - 1
         if is_free:
-            begin = share[first] + room * cut_start
-            end = max(share[last] - room * cut_end, begin)
+            begin = share[first] + stopping * cut_start
+            end = max(share[last] - stopping * cut_end, begin)
         else:
-            begin = max(share[first] - room - share[1], 0.0) if cut_start else 0.0
-            end = min(share[last] + room + share[1], 1.0) if cut_end else 1.0
+            begin = max(share[first] - stopping - share[1], 0.0) if cut_start else 0.0
+            end = min(share[last] + stopping + share[1], 1.0) if cut_end else 1.0
         part = stroke.part(begin, end)
         if is_free and part.length >= min_stroke:
             clear.append(part)

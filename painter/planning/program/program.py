@@ -1,4 +1,4 @@
-"""From a segmentation to a paint program: strokes, their order in time, every move."""
+"""From a segmentation to a paint program: strokes, their order, every move."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ from painter.planning.motion.surface_frame import SurfaceFrame, above_wall
 from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.motion.verify import verify_motion, verify_strokes
 from painter.planning.program.clear_strokes import RUN_OUT, clear_strokes
-from painter.planning.program.stroke_links import connect_strokes
+from painter.planning.program.connect_strokes import connect_strokes
 from painter.planning.spray_path import PaintProgram, Stroke
 from painter.planning.strokes.raster import plan_strokes
 from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.strokes.touch_up import touch_up_strokes
 from painter.planning.tile import cell_centres
 from painter.planning.zones import in_zones
-from perception.ground import BoolArray, FloatArray, FrozenValue
+from perception.ground import BoolArray, FloatArray
 from perception.values import WallSegmentation
 
 
 @dataclass(frozen=True, eq=False)
-class ProgramPlanner(FrozenValue):
+class ProgramPlanner:
     """Plans paint programs for one robot with one set of settings.
 
-    Strokes that come nearer than the clearance to an obstacle, or out of reach, are cut
-    back; what is cut, and strokes that cannot be come to, stand in the program's
-    `skipped`. Where the wall is not flat the gun follows its surface; see
+    Strokes are cut back where they are out of reach or come nearer to an obstacle than
+    the clearance. What is cut, and strokes without a feasible approach, are listed in
+    the program's `skipped`. Where the wall is not flat the gun follows its surface; see
     `SurfaceFrame`.
 
     Attributes:
@@ -56,7 +56,7 @@ class ProgramPlanner(FrozenValue):
     motion: MotionConfig
 
     def strokes(self, segmentation: WallSegmentation) -> tuple[Stroke, ...]:
-        """Returns strokes over a tile's wall alone, as `plan_strokes` finds them."""
+        """Returns the strokes of a tile as `plan_strokes` finds them."""
         return plan_strokes(
             np.asarray(segmentation.wall_mask),
             segmentation.cell,
@@ -71,14 +71,14 @@ class ProgramPlanner(FrozenValue):
         return SpraySettings(self.tip, self.raster)
 
     def paintable(self, segmentation: WallSegmentation) -> BoolArray:
-        """Returns the wall (ny, nx) that the operator's zones leave to be painted."""
+        """Returns the cells (ny, nx) of the wall that the zones leave to be painted."""
         mask = np.asarray(segmentation.wall_mask)
         return in_zones(mask, segmentation.cell, self.raster.zones)
 
     def touch_up_strokes(
         self, segmentation: WallSegmentation, film: FloatArray
     ) -> tuple[Stroke, ...]:
-        """Returns the strokes that mend a film where it is thin.
+        """Returns the strokes that touch up a film where it is thin.
 
         Args:
             segmentation: Of the tile.
@@ -103,14 +103,14 @@ class ProgramPlanner(FrozenValue):
         return self.spray.nominal_film(width)
 
     def program(
-        self, wanted: Sequence[Stroke], segmentation: WallSegmentation, q0: FloatArray
+        self, strokes: Sequence[Stroke], segmentation: WallSegmentation, q0: FloatArray
     ) -> PaintProgram:
-        """Plans the motion that makes given strokes.
+        """Plans the motion that sprays given strokes.
 
         Args:
-            wanted: Strokes in T, in any order and direction; coats follow one another.
-            segmentation: Of the tile; what stands before the wall is kept clear of.
-            q0: (5,) rad, where the arm stands, at rest.
+            strokes: In T, in any order and direction; coats follow one another.
+            segmentation: Of the tile; what stands out of the wall is an obstacle.
+            q0: (5,) rad, where the arm is at rest.
 
         Returns:
             The program, verified; its motion ends at the home pose.
@@ -121,7 +121,7 @@ class ProgramPlanner(FrozenValue):
             MotionLimitError: The finished motion fails its verification.
         """
         motion, limits = self.motion, self.limits
-        ik = self._gun(segmentation)
+        ik = self._wall_ik(segmentation)
         space = ClearSpace(
             self.checker,
             X_WT=segmentation.X_WT,
@@ -135,26 +135,27 @@ class ProgramPlanner(FrozenValue):
             space=space,
             q_home=np.deg2rad(motion.home_deg),
         )
-        clear, skipped = clear_strokes(wanted, transitions, self.raster.min_stroke)
-        path, strokes, passes, unlinked = connect_strokes(
-            clear, q0, transitions, self.raster.flash_off
-        )
+        clear, skipped = clear_strokes(strokes, transitions, self.raster.min_stroke)
+        connected = connect_strokes(clear, q0, transitions, self.raster.flash_off)
+        path, sprayed = connected.path, connected.strokes
         starts = start_times(path)[:-1]
-        flows = [[starts[i], starts[i] + path[i].duration] for i in passes]
+        open_times = [
+            [starts[i], starts[i] + path[i].duration] for i in connected.passes
+        ]
         program = PaintProgram(
-            strokes=strokes,
+            strokes=tuple(sprayed),
             motion=chain(
                 path,
                 period=motion.sample_period,
-                spray_on=np.reshape(flows, (-1, 2)) - self.tip.valve_delay,
-                flow=np.array([stroke.flow for stroke in strokes]),
+                spray_on=np.reshape(open_times, (-1, 2)) - self.tip.valve_delay,
+                flow=np.array([stroke.flow for stroke in sprayed]),
             ),
             X_WT=segmentation.X_WT,
             standoff=self.raster.standoff,
             nominal_thickness=self.nominal_film(segmentation),
             paint_volume=self.tip.flow
-            * sum(stroke.flow * stroke.length / stroke.speed for stroke in strokes),
-            skipped=(*skipped, *unlinked),
+            * sum(stroke.flow * stroke.length / stroke.speed for stroke in sprayed),
+            skipped=(*skipped, *connected.skipped),
         )
         verify_motion(
             program.motion,
@@ -172,8 +173,8 @@ class ProgramPlanner(FrozenValue):
         )
         return program
 
-    def _gun(self, segmentation: WallSegmentation) -> WallIk:
-        """Returns the gun before a wall; it follows the wall's surface."""
+    def _wall_ik(self, segmentation: WallSegmentation) -> WallIk:
+        """Returns the arm's inverse kinematics before a wall, along its surface."""
         surface = SurfaceFrame.of_wall(segmentation)
         return WallIk(self.kinematics, segmentation.X_WT, surface)
 
@@ -186,7 +187,7 @@ class ProgramPlanner(FrozenValue):
         reached = nearest_standoffs(
             x,
             y,
-            ik=self._gun(segmentation),
+            ik=self._wall_ik(segmentation),
             limits=self.limits,
             near=self.raster.cut_in_standoff,
             far=self.raster.standoff,
@@ -205,12 +206,12 @@ class ProgramPlanner(FrozenValue):
 
 
 def strokes_from(strokes: Sequence[Stroke], from_stroke: float) -> tuple[Stroke, ...]:
-    """Returns what is left of strokes once those before a number are done.
+    """Returns the strokes that remain once those before a number are done.
 
     Args:
         strokes: In order of execution.
-        from_stroke: Number of the first, from 1; 12.4 begins where four tenths of the
-            twelfth are done.
+        from_stroke: Number of the first, from 1; 12.4 begins four tenths along the
+            twelfth.
 
     Raises:
         InputError: There is no such stroke.

@@ -1,4 +1,4 @@
-"""What is left to do on a tile that was seen before."""
+"""The strokes that remain on a tile that was segmented before."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from perception.values import WallSegmentation
 class Remainder(FrozenValue):
     """Strokes that a wall still needs: the rest of a job, or its touch-up.
 
-    It holds while the base stands where it stood: the wall is not looked at again.
+    It is valid while the base does not move: the wall is not scanned again.
 
     Attributes:
-        segmentation: Of the tile, as it was seen.
+        segmentation: Of the tile, from the first scan.
         strokes: In T, in any order.
     """
 

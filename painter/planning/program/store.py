@@ -37,12 +37,12 @@ def program_summary(program: PaintProgram) -> dict[str, Any]:
 def save_program(
     folder: Path, program: PaintProgram, preview: FilmPreview | None = None
 ) -> None:
-    """Writes a program; each of the two files is there whole or not at all.
+    """Writes a program; each of the two files is written whole or not at all.
 
     Args:
-        folder: Where to; it exists.
-        program: What to write.
-        preview: The film that it will leave; figures and map go with the program.
+        folder: Existing folder to write to.
+        program: The program.
+        preview: The film that it will leave; its figures and map are written too.
     """
     motion = program.motion
     strokes = [
@@ -113,7 +113,7 @@ def load_program(folder: Path) -> PaintProgram:
         ) from error
     except KeyError as error:
         raise InputError(
-            f"{path}: has no {error.args[0]!r}.", code="PNT-PROGRAM-003"
+            f"{path}: field {error.args[0]!r} is missing.", code="PNT-PROGRAM-003"
         ) from error
     except (ValueError, TypeError) as error:
         raise InputError(

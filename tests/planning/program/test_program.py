@@ -9,8 +9,8 @@ from painter.planning.clearance.obstacles import ObstacleBox
 from painter.planning.config import MotionConfig, RasterConfig
 from painter.planning.motion.verify import verify_motion, verify_strokes
 from painter.planning.program.clear_strokes import has_run_out
+from painter.planning.program.join_stroke import join_stroke
 from painter.planning.program.program import strokes_from
-from painter.planning.program.stroke_links import _fit
 from painter.planning.spray_path import Motion, Stroke
 
 HOME = np.deg2rad(MotionConfig().home_deg)
@@ -324,9 +324,9 @@ def test_a_stroke_of_which_nothing_is_left_by_trimming_is_left_out(length):
     start, end = np.array([0.3, 1.3]), np.array([0.3, 1.3 + length])
     stroke = Stroke(start, end, 0.6, "cut_in", 0, 0.2)
     for asked in range(1, 6):
-        fit = _fit(stroke, False, None, HOME, NoWay(asked))
-        assert fit.stroke is None and fit.link == []
-        assert [item.stroke for item in fit.skipped] == [stroke]
+        dut = join_stroke(stroke, None, HOME, NoWay(asked), has_run_out=False)
+        assert dut.stroke is None and dut.transition == []
+        assert [item.stroke for item in dut.skipped] == [stroke]
 
 
 def test_run_out_is_room_beyond_the_end_in_the_direction_of_travel(robot):

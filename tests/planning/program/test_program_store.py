@@ -81,7 +81,7 @@ def test_missing_damaged_and_foreign_files_are_named(program, tmp_path):
     with pytest.raises(InputError, match=r"trajectory\.npz: not a readable"):
         load_program(tmp_path)
     (tmp_path / "program.json").write_text("{}")
-    with pytest.raises(InputError, match=r"program\.json: has no 'strokes'"):
+    with pytest.raises(InputError, match=r"program\.json: field 'strokes' is missing"):
         load_program(tmp_path)
     (tmp_path / "program.json").write_text("{")
     with pytest.raises(InputError, match=r"program\.json: is not a paint program"):

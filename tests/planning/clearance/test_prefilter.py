@@ -1,4 +1,4 @@
-"""What is proven clear is clear, and most of what is clear is proven."""
+"""What the prefilter passes is clear, and it passes most of what is clear."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from pydrake.common import Parallelism
 from pydrake.geometry import Box, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from painter.planning.clearance.separation import SeparatingAxisPrefilter
+from painter.planning.clearance.prefilter import SeparatingAxisPrefilter
 from painter.planning.config import TileConfig
 from painter.planning.tile import nominal_tile_pose
 
@@ -31,7 +31,7 @@ def free(checker, q):
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
-def test_nothing_that_drake_finds_blocked_is_proven(robot, tilt):
+def test_nothing_that_drake_finds_blocked_passes(robot, tilt):
     rng = np.random.default_rng(4)
     X_WS = X_WT @ RigidTransform(RollPitchYaw(tilt, 0.5 * tilt, -tilt), np.zeros(3))
     places = rng.uniform((0.0, 0.0, 0.0), (1.5, 1.5, 0.3), (6, 3))
@@ -44,42 +44,38 @@ def test_nothing_that_drake_finds_blocked_is_proven(robot, tilt):
     q = rng.uniform(limits.q_min, limits.q_max, (4000, 5))
     is_free = free(checker, q)
     assert 0.1 < is_free.mean() < 0.9
-    proven = SeparatingAxisPrefilter(checker, X_WS).surely_clear(q, CLEARANCE)
-    assert not (proven & ~is_free).any()
-    # Of arms folded at random less is proven than of arms at work.
-    assert (proven & is_free).sum() > 0.2 * is_free.sum()
+    passed = SeparatingAxisPrefilter(checker, X_WS).passes(q, CLEARANCE)
+    assert not (passed & ~is_free).any()
+    # Fewer arms folded at random pass than arms at work.
+    assert (passed & is_free).sum() > 0.2 * is_free.sum()
 
 
-def test_gun_before_the_wall_is_proven_clear_nearly_everywhere(robot):
+def test_gun_before_the_wall_passes_nearly_everywhere(robot):
     x, y = np.meshgrid(np.linspace(0.1, 1.9, 19), np.linspace(0.1, 1.9, 19))
     places = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.3)])
     q = robot.transitions().ik.inverse_kinematics(places)
     wall = (Box(4.0, 4.0, 0.1), X_WT @ RigidTransform([1.0, 1.0, -0.05]))
     checker = checker_with(robot, wall)
     assert free(checker, q).all()
-    assert (
-        SeparatingAxisPrefilter(checker, X_WT).surely_clear(q, CLEARANCE).mean() > 0.95
-    )
+    assert SeparatingAxisPrefilter(checker, X_WT).passes(q, CLEARANCE).mean() > 0.95
 
 
-@pytest.mark.parametrize(("clearance", "proven"), [(0.0495, True), (0.0505, False)])
-def test_bound_is_the_gap_before_the_nozzle(robot, clearance, proven):
+@pytest.mark.parametrize(("clearance", "passed"), [(0.0495, True), (0.0505, False)])
+def test_bound_is_the_gap_before_the_nozzle(robot, clearance, passed):
     """A box 5 cm before a gun that is square to its face."""
     q = robot.transitions().ik.inverse_kinematics(np.array([[1.0, 1.0, 0.3]]))
     box = (Box(0.2, 0.2, 0.1), X_WT @ RigidTransform([1.0, 1.0, 0.2]))
-    separation = SeparatingAxisPrefilter(checker_with(robot, box), X_WT)
-    assert separation.surely_clear(q, clearance).tolist() == [proven]
+    dut = SeparatingAxisPrefilter(checker_with(robot, box), X_WT)
+    assert dut.passes(q, clearance).tolist() == [passed]
 
 
 def test_configurations_out_of_reach_and_none_are_left_open(robot):
-    separation = SeparatingAxisPrefilter(robot.checker, X_WT)
-    assert separation.surely_clear(np.full((1, 5), np.nan), CLEARANCE).tolist() == [
-        False
-    ]
-    assert separation.surely_clear(np.zeros((0, 5)), CLEARANCE).tolist() == []
+    dut = SeparatingAxisPrefilter(robot.checker, X_WT)
+    assert dut.passes(np.full((1, 5), np.nan), CLEARANCE).tolist() == [False]
+    assert dut.passes(np.zeros((0, 5)), CLEARANCE).tolist() == []
 
 
-def test_shape_of_unknown_shadow_is_refused(robot):
+def test_shape_of_unknown_projection_is_refused(robot):
     checker = checker_with(robot, (Sphere(0.1), RigidTransform([2.0, 0.0, 1.0])))
-    with pytest.raises(TypeError, match="box or a cylinder, got Sphere"):
+    with pytest.raises(TypeError, match="Box or a Cylinder, got Sphere"):
         SeparatingAxisPrefilter(checker, X_WT)

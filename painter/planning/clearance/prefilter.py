@@ -1,9 +1,9 @@
-"""Configurations of which it is plain that the arm keeps clear, many at once.
+"""A separating-axis prefilter: proves clearance of many configurations at once.
 
-Convex bodies whose shadows on a line are some distance apart are at least as far apart
-themselves. Shadows of boxes and cylinders are quick to find for many configurations
-together, and those on the axes of one of the two links mostly show enough; only what
-they leave open has to be asked of a collision checker.
+Convex bodies whose projections on an axis are some distance apart are at least as far
+apart themselves. Projections of boxes and cylinders are quick to compute for many
+configurations together, and those on the axes of one of the two links are mostly
+enough; a collision checker has to answer only for the rest.
 """
 
 import itertools
@@ -19,9 +19,9 @@ from pydrake.planning import CollisionChecker
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
 _MARGIN = 1e-4  # m, on every distance: far above the rounding of the checker's own.
-_NEAR = 2  # Joints between bodies of which each shape is looked at by itself.
-_AT_A_TIME = 64  # Configurations; the arrays of more do not stay in the cache.
-# Shadows are of single precision: at 10 m that is 1 um, nothing beside the margin.
+_NEAR = 2  # Joints between bodies whose shapes are checked one by one.
+_AT_A_TIME = 64  # Configurations; the arrays of more do not fit into the cache.
+# Projections are of single precision: at 10 m that is 1 um, far below the margin.
 _Singles = npt.NDArray[np.floating[Any]]
 
 # How many joints move a body, the body (Drake's), and its shapes.
@@ -30,11 +30,11 @@ _Part = tuple[int, Any, list["_Shape"]]
 
 @dataclass(frozen=True, eq=False)
 class _Shape(FrozenValue):
-    """A box or a cylinder, as it is in W while all joints are at 0.
+    """A box or a cylinder, in W with all joints at 0.
 
     Attributes:
         vectors: (3, 5), m: its centre, three half edges, and 1 along a cylinder's axis.
-            A cylinder has but one edge, a box no axis.
+            A cylinder has only the third edge, a box no axis.
         radius: m, of a cylinder; 0 of a box.
     """
 
@@ -43,10 +43,10 @@ class _Shape(FrozenValue):
 
     @classmethod
     def of(cls, shape: Shape, X_WS: RigidTransform) -> "_Shape":
-        """Makes it of Drake's, at its pose.
+        """Makes it from a shape of Drake's at its pose.
 
         Raises:
-            TypeError: It is neither box nor cylinder.
+            TypeError: The shape is neither a box nor a cylinder.
         """
         R = X_WS.rotation().matrix()
         vectors = np.zeros((3, 5))
@@ -55,24 +55,26 @@ class _Shape(FrozenValue):
             vectors[:, 1:4] = R * (shape.size() / 2.0)
             return cls(vectors, 0.0)
         if not isinstance(shape, Cylinder):
-            raise TypeError(f"must be a box or a cylinder, got {type(shape).__name__}.")
+            raise TypeError(
+                f"shape must be a Box or a Cylinder, got {type(shape).__name__}."
+            )
         vectors[:, 3] = R[:, 2] * (shape.length() / 2.0)
         vectors[:, 4] = R[:, 2]
         return cls(vectors, shape.radius())
 
 
 class _Shapes:
-    """Vectors of many shapes side by side, and the shadows that they throw.
+    """Vectors of many shapes side by side, and their projections.
 
     Attributes:
         count: How many shapes.
         vectors: (k, 3), m: all centres, the first, second and third edges of boxes,
             the edges of cylinders and their axes.
-        owners: (k,) of which shape each of these is.
+        owners: (k,) the shape that each of these belongs to.
     """
 
     def __init__(self, shapes: list[_Shape]) -> None:
-        """Makes them of shapes; centres are in their order."""
+        """Collects the vectors of shapes; centres are in their order."""
         vectors = np.stack([shape.vectors for shape in shapes])
         radii = np.array([shape.radius for shape in shapes], np.float32)
         self._boxes, self._round = np.flatnonzero(radii == 0.0), np.flatnonzero(radii)
@@ -87,32 +89,32 @@ class _Shapes:
         )
         self.vectors = vectors[self.owners, :, kinds]
 
-    def spans(self, shadows: _Singles) -> tuple[_Singles, _Singles]:
-        """Returns middles and half lengths of shadows, each (axes, shapes, n), m.
+    def spans(self, components: _Singles) -> tuple[_Singles, _Singles]:
+        """Returns middles and half lengths of projections, each (axes, shapes, n), m.
 
         Args:
-            shadows: (axes, k, n) components of the vectors on the axes.
+            components: (axes, k, n) of the vectors along the axes.
         """
         boxes, count = self._boxes.size, self._round.size
-        edges = np.abs(shadows[:, self.count : len(self.vectors) - count])
+        edges = np.abs(components[:, self.count : len(self.vectors) - count])
         first, second, third, along = np.split(
             edges, [boxes, 2 * boxes, 3 * boxes], axis=1
         )
-        across = 1.0 - shadows[:, len(self.vectors) - count :] ** 2
-        half = np.empty_like(shadows[:, : self.count])
+        across = 1.0 - components[:, len(self.vectors) - count :] ** 2
+        half = np.empty_like(components[:, : self.count])
         half[:, self._boxes] = first + second + third
         half[:, self._round] = along + self._radii * np.sqrt(np.maximum(across, 0.0))
-        return shadows[:, : self.count], half
+        return components[:, : self.count], half
 
 
 @dataclass(frozen=True, eq=False)
 class _Pairs(FrozenValue):
-    """Pairs of parts, each of them looked at from both sides along three axes.
+    """Pairs of parts, each compared along three axes in both directions.
 
     Attributes:
-        one: (6, pairs) where, among the ends of shadows, are those of the one.
-        other: (6, pairs) those of the other that face them.
-        required: (pairs, 1) m, by which they may not be nearer.
+        one: (6, pairs) rows of the ends of the one part's projections; see `_ends`.
+        other: (6, pairs) rows of the ends of the other part that face them.
+        required: (pairs, 1) m, least distance.
     """
 
     one: IntArray
@@ -120,26 +122,25 @@ class _Pairs(FrozenValue):
     required: _Singles
 
     def of(self, few: IntArray) -> "_Pairs":
-        """Returns a few of them."""
+        """Returns some of the pairs."""
         return _Pairs(self.one[:, few], self.other[:, few], self.required[few])
 
     def apart(self, ends: _Singles) -> BoolArray:
-        """Tells of which pairs it is plain that they are apart, (pairs, n)."""
+        """Returns which pairs are proven to be far enough apart, (pairs, n)."""
         overlap = ends[self.one]
         overlap += ends[self.other]
         return np.asarray(overlap.min(axis=0) <= -self.required)
 
 
 class SeparatingAxisPrefilter:
-    """Proves that configurations keep clear; what it does not prove stays open."""
+    """Proves that configurations keep clear; what it cannot prove stays open."""
 
     def __init__(self, checker: CollisionChecker, X_WT: RigidTransform) -> None:
         """Reads the robot of a checker, and the shapes that were added around it.
 
         Args:
-            checker: Its positions are those of revolute joints, each of which moves
-                all that the next one moves.
-            X_WT: Along whose axes added shapes stand that do not stand along W's.
+            checker: Its positions are those of a serial chain of revolute joints.
+            X_WT: Frame along whose axes added shapes lie that do not lie along W's.
         """
         plant = checker.plant()
         context = plant.CreateDefaultContext()
@@ -176,41 +177,41 @@ class SeparatingAxisPrefilter:
         links = np.array([link for link, _, _ in parts])
         self._shapes = _Shapes([shape for _, _, some in parts for shape in some])
         self._firsts = np.cumsum([0, *counts])
-        # Of each link's pose its columns: three axes, and where its origin is.
+        # The columns of each link's pose: three axes and its origin.
         vectors = self._shapes.vectors
         self._vectors = np.zeros((len(joints) + 1, 4, len(vectors)), np.float32)
         of_link = np.repeat(links, counts)[self._shapes.owners]
         self._vectors[of_link, :3, np.arange(len(vectors))] = vectors
-        # Centres move as well, edges and axes but turn.
+        # Centres turn and move, edges and axes only turn.
         centres = np.arange(self._shapes.count)
         self._vectors[of_link[centres], 3, centres] = 1.0
         self._R_WT = X_WT.rotation().matrix()
         self._parts = self._shapes.count + len(parts)
         self._pairs(checker, parts)
         moving = self._shapes.count + np.flatnonzero(links > 0)
-        self._around = self._shadows_around(checker, moving)
+        self._around = self._ends_around(checker, moving)
 
-    def surely_clear(self, q: FloatArray, clearance: float) -> BoolArray:
-        """Tells of which configurations it is plain that they keep clear.
+    def passes(self, q: FloatArray, clearance: float) -> BoolArray:
+        """Returns which configurations are proven to keep clear.
 
         Args:
             q: (n, joints) rad.
-            clearance: From what was added around the robot, m; of each other the
-                robot's parts keep what the checker asked for as this was made.
+            clearance: From the shapes added around the robot, m. Between the robot's
+                own parts it is the checker's padding when this was made.
 
         Returns:
-            (n,) bool; where it is False they may or may not.
+            (n,) bool; where it is False the configuration may keep clear or not.
         """
         some = [
-            self._proven(q[first : first + _AT_A_TIME], clearance + _MARGIN)
+            self._passes(q[first : first + _AT_A_TIME], clearance + _MARGIN)
             for first in range(0, len(q), _AT_A_TIME)
         ]
         return np.concatenate(some) if some else np.zeros(0, dtype=bool)
 
-    def _proven(self, q: FloatArray, clearance: float) -> BoolArray:
+    def _passes(self, q: FloatArray, clearance: float) -> BoolArray:
         ends = self._ends(q)
         clear = self._far.apart(ends).all(axis=0)
-        # The axes of one link show it of nearly all pairs.
+        # The axes of one link prove it for nearly all pairs.
         first, *others = self._near
         apart = first.apart(ends)
         few = np.flatnonzero(~apart.all(axis=1))
@@ -224,11 +225,11 @@ class SeparatingAxisPrefilter:
         return np.asarray(clear)
 
     def _ends(self, q: FloatArray) -> _Singles:
-        """Returns where shadows end along axes and against them, (rows, n), m.
+        """Returns the ends of projections along axes and against them, (rows, n), m.
 
-        Axes are those of the links from the foot on, three each, and those of T; parts
-        are shapes, and after them whole bodies. Against an axis counts what lies below
-        zero. See `_rows`.
+        Axes are those of the links from the base on, three each, and those of T. Parts
+        are shapes, and after them whole bodies. An end against an axis is the negative
+        of the lower end. `_rows` gives the order.
         """
         count, size, vectors = len(q), self._shapes.count, len(self._shapes.vectors)
         angle = q[:, :, None, None]
@@ -243,10 +244,10 @@ class SeparatingAxisPrefilter:
         axes = np.empty((count, len(X) + 1, 3, 3), np.float32)
         axes[:, :-1] = poses[..., :3].transpose(0, 2, 3, 1)
         axes[:, -1] = self._R_WT.T
-        shadows = axes.reshape(count, -1, 3) @ placed.reshape(count, 3, -1)
-        # Configurations come last, so that all else is done to whole rows of them.
-        shadows = np.ascontiguousarray(shadows.reshape(count, -1).T)
-        middle, half = self._shapes.spans(shadows.reshape(-1, vectors, count))
+        components = axes.reshape(count, -1, 3) @ placed.reshape(count, 3, -1)
+        # Configurations come last, so that all else works on whole rows of them.
+        components = np.ascontiguousarray(components.reshape(count, -1).T)
+        middle, half = self._shapes.spans(components.reshape(-1, vectors, count))
         ends = np.empty((2, len(half), self._parts, count), np.float32)
         np.add(half, middle, out=ends[0, :, :size])
         np.subtract(half, middle, out=ends[1, :, :size])
@@ -255,12 +256,12 @@ class SeparatingAxisPrefilter:
         return ends.reshape(-1, count)
 
     def _rows(self, axes: IntArray, parts: IntArray) -> tuple[IntArray, IntArray]:
-        """Returns where the ends of parts along axes are, and those against them."""
+        """Returns the rows of the ends of parts along axes, and against them."""
         along = self._parts * axes + parts
         return along, along + self._parts * 3 * (len(self._turns) + 2)
 
     def _pairs(self, checker: CollisionChecker, parts: list[_Part]) -> None:
-        """Lists the pairs of parts that may not meet, and on which axes to look."""
+        """Lists the pairs of parts that may collide, and the axes to project on."""
         count = self._shapes.count
         near: list[tuple[int, int, float, tuple[int, ...]]] = []
         far: list[tuple[int, int, float, tuple[int, ...]]] = []
@@ -286,7 +287,7 @@ class SeparatingAxisPrefilter:
     def _listed(
         self, pairs: list[tuple[int, int, float, tuple[int, ...]]]
     ) -> list[_Pairs]:
-        """Returns pairs (one, other, required, links) on the axes of each link."""
+        """Returns pairs (one, other, required, links) for the axes of each link."""
         one, other, required, links = (
             np.array(column) for column in zip(*pairs, strict=True)
         )
@@ -305,15 +306,15 @@ class SeparatingAxisPrefilter:
             )
         return listed
 
-    def _shadows_around(
+    def _ends_around(
         self, checker: CollisionChecker, moving: IntArray
     ) -> list[tuple[IntArray, _Singles]]:
-        """Returns where shadows of what was added end that moving parts face.
+        """Returns the ends of added shapes' projections that moving parts face.
 
-        On T's axes, then on W's, those shapes that are shorter there.
+        Shapes are projected on T's axes or on W's, on whichever they are shorter.
 
         Returns:
-            Twice the rows (6, moving) of ends and the ends (6, shapes, 1), m.
+            For T and for W: rows (6, moving) of ends and the ends (6, shapes, 1), m.
         """
         shapes = _Shapes(
             [
