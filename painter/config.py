@@ -23,7 +23,7 @@ from painter.planning.config import (
     TileConfig,
     TipConfig,
 )
-from painter.resources import models_path
+from painter.resources import models_path, named_scenarios
 from perception.config import MapConfig, SegmentationConfig, StereoConfig
 from perception.ground import check_positive
 from perception.mapping.config import PoseGraphConfig
@@ -203,12 +203,6 @@ class Scenario:
             self.motion,
         ):
             part.validate()
-
-
-def named_scenarios() -> list[str]:
-    """Returns the names of the scenarios that come with the package."""
-    files = models_path("scenarios").glob("*.scenario.yaml")
-    return sorted(path.name.removesuffix(".scenario.yaml") for path in files)
 
 
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:

@@ -1,6 +1,6 @@
 """Errors that Painter reports in one line: what, where, and the bound."""
 
-from perception.ground import CodedError
+from perception.coded_error import CodedError
 
 
 class PainterError(CodedError):

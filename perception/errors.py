@@ -1,6 +1,6 @@
 """Errors of perception; each message names the file or quantity, value and bound."""
 
-from perception.ground import CodedError
+from perception.coded_error import CodedError
 
 
 class PerceptionError(CodedError):

@@ -1,10 +1,9 @@
-"""What every room stands on: frozen values, array types, errors, checks.
+"""What every room stands on: frozen values, array types, checks.
 
 NumPy alone.
 """
 
 import dataclasses
-import functools
 import math
 from typing import Any, Self
 
@@ -37,32 +36,6 @@ class FrozenValue:
     def replace(self, **changes: Any) -> Self:
         """Returns a copy with some fields exchanged."""
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
-
-
-class CodedError(Exception):
-    """An error that a person is told in one line; the base of all of the project's own.
-
-    Attributes:
-        code: Stable name of what went wrong, "PNT-AREA-NNN", one for each place that
-            raises: documentation and programs know the error by it.
-        exit_code: Exit status of a command that ends with it.
-    """
-
-    exit_code = 1
-
-    def __init__(self, message: str, *, code: str) -> None:
-        """Creates it.
-
-        Args:
-            message: File or field, value, bound and cure, in one line.
-            code: Its name; never given to another error later.
-        """
-        super().__init__(message)
-        self.code = code
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Lets the error cross to another process with its code."""
-        return functools.partial(type(self), code=self.code), self.args
 
 
 def check_positive(owner: str, **values: float) -> None:

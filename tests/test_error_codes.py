@@ -10,7 +10,7 @@ from pathlib import Path
 import painter.canopen.protocol.sdo
 import painter.errors
 import perception.errors
-from perception.ground import CodedError
+from perception.coded_error import CodedError
 
 ROOT = Path(__file__).parents[1]
 CODE = re.compile(r"PNT-[A-Z]+-\d{3}")

@@ -39,9 +39,10 @@ OPEN = {"perception.ground", "perception.settings"}
 # `OPEN`; the longest matching name counts. A room that is listed lower never imports
 # one that is listed higher.
 ROOMS: dict[str, set[str]] = {
+    "perception.coded_error": set(),
     "perception.ground": set(),
     "perception.settings": set(),
-    "perception.errors": set(),
+    "perception.errors": {"perception.coded_error"},
     "perception.config": set(),
     "perception.values": set(),
     "perception.depth_camera": {"perception.config", "perception.errors"},
@@ -71,6 +72,7 @@ ROOMS: dict[str, set[str]] = {
         "perception.config",
         "perception.errors",
         "perception.fine_steps",
+        "perception.io",
         "perception.paper_steps",
         "perception.segmentation",
         "perception.values",
@@ -124,7 +126,7 @@ ROOMS: dict[str, set[str]] = {
     },
     "perception.mapping": set(),
     "perception": set(),
-    "painter.errors": set(),
+    "painter.errors": {"perception.coded_error"},
     "painter.timebase": set(),
     "painter.resources": {"painter_models"},
     "painter.planning.config": set(),
@@ -214,6 +216,8 @@ ROOMS: dict[str, set[str]] = {
         "painter.planning",
         "painter.resources",
         "painter.scene",
+        "perception.io",
+        "perception.mapping",
     },
     "painter.systems": SYSTEM_VALUES
     | {"painter.errors", "painter.planning", "perception.errors", "perception.values"},
@@ -289,6 +293,9 @@ ROOMS: dict[str, set[str]] = {
         "painter.run",
         "painter.scene",
         "painter.systems",
+        "painter.timebase",
+        "perception.depth_camera",
+        "perception.io",
         "perception.values",
     },
     "painter.rehearsal": {
@@ -303,10 +310,22 @@ ROOMS: dict[str, set[str]] = {
         "painter.run",
         "painter.scene",
         "painter.systems",
+        "painter.timebase",
     },
     # The public face stands above all but the commands.
-    "painter": set(),
+    "painter": {
+        "painter.config",
+        "painter.cycle",
+        "painter.diagrams",
+        "painter.errors",
+        "painter.resources",
+        "painter.robot",
+        "painter.run",
+        "painter.scene",
+        "perception",
+    },
     "painter.cli": {"painter", "perception"},
+    "painter.__main__": {"painter.cli"},
     # Draws the robot with the robot's own model.
     "models": {"models", "painter_models", "painter.robot"},
     "benchmarks": {"benchmarks", "painter", "painter_models", "perception"},

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from painter.config import named_scenarios
+from painter.resources import named_scenarios
 
 ROOT = Path(__file__).parents[1]
 # Folder in the checkout -> package in the wheel.
@@ -58,7 +58,8 @@ def test_installed_package_finds_its_models(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = (
         "import painter_models\n"
-        "from painter.config import load_scenario, named_scenarios\n"
+        "from painter.config import load_scenario\n"
+        "from painter.resources import named_scenarios\n"
         "for name in named_scenarios(): load_scenario(name)\n"
         "print(painter_models.__file__, *named_scenarios())"
     )

@@ -6,9 +6,9 @@ import math
 import pytest
 import yaml
 
-from painter.config import Scenario, dump_scenario, load_scenario, named_scenarios
+from painter.config import Scenario, dump_scenario, load_scenario
 from painter.errors import InputError
-from painter.resources import models_path
+from painter.resources import models_path, named_scenarios
 
 # DESIGN section 7.
 NAMES = {"blank", "cubes", "obstacles", "random", "room", "terrace"}

@@ -1,27 +1,44 @@
-"""What the commands share: options, results, progress and output folders."""
+"""What the commands share: options, results, errors, progress and output folders."""
 
-import importlib.metadata
 import json
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from painter.errors import InputError
-from painter.planning.config import ZoneConfig
+from painter.resources import named_scenarios
+
+if TYPE_CHECKING:
+    from painter.planning.config import ZoneConfig
+
+
+def complete_scenario(incomplete: str) -> list[str]:
+    """Returns the named scenarios that begin with what was typed."""
+    return [name for name in named_scenarios() if name.startswith(incomplete)]
+
 
 ScenarioArgument = Annotated[
     str | None,
     typer.Argument(
-        help="Name of a scenario, or the path of its YAML file; default cubes, or that "
-        "of the run gone on with.",
+        metavar="[SCENARIO]",
+        help="Named scenario or path of a scenario's YAML file.  [default: cubes, or "
+        "the scenario of the run that is resumed or touched up]",
         show_default=False,
+        autocompletion=complete_scenario,
+    ),
+]
+ScenarioOption = Annotated[
+    str,
+    typer.Option(
+        metavar="SCENARIO",
+        help="Scenario that describes the robot, tip and settings: a name or a YAML "
+        "file.",
+        autocompletion=complete_scenario,
     ),
 ]
 SetOption = Annotated[
@@ -29,34 +46,68 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Set a scenario value in SI units, e.g. raster.speed=0.5; repeatable.",
+        help="Override a scenario value, in SI units, e.g. raster.speed=0.5; "
+        "repeatable.",
     ),
 ]
 OutOption = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Folder to write the result to.")
+    Path, typer.Option("--out", metavar="DIR", help="Folder for the result.")
+]
+RunFolderOption = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Run folder to write.")
+]
+ResumeOption = Annotated[
+    Path | None,
+    typer.Option(metavar="RUN", help="Resume a stopped run: paint what it left."),
+]
+BusOption = Annotated[
+    Path | None,
+    typer.Option("--bus", metavar="FILE", help="Bus file.  [default: the robot's]"),
+]
+InterfaceOption = Annotated[
+    str | None,
+    typer.Option(
+        help="python-can interface (socketcan, slcan, udp_multicast ...), or `local` "
+        "for a socket on this machine; overrides the bus file."
+    ),
+]
+ChannelOption = Annotated[
+    str | None,
+    typer.Option(
+        help="CAN channel, e.g. can0, or path of the socket; overrides the bus file."
+    ),
 ]
 RateOption = Annotated[
     float,
     typer.Option(
         min=0.05,
         max=1.0,
-        help="Seconds of the run's clock in a second: below 1, simulated drives, world "
-        "and brain have more time; the same for `painter drives` and `painter deploy`.",
+        help="Speed of the run's clock against real time. Below 1, simulated drives, "
+        "world and planning get more computing time. `painter drives` and `painter "
+        "deploy` must use the same value.",
+    ),
+]
+IncludeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--include",
+        metavar="X,Y,X,Y...",
+        help="Paint only inside this zone: two opposite corners of a rectangle, or all "
+        "corners of a polygon, m from the lower left corner; repeatable.",
+    ),
+]
+ExcludeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--exclude",
+        metavar="X,Y,X,Y...",
+        help="Do not paint inside this zone; same form as --include; repeatable.",
     ),
 ]
 JsonOption = Annotated[
-    bool, typer.Option("--json", help="Print the result as JSON alone on stdout.")
+    bool,
+    typer.Option("--json", help="Print only the result, as JSON, on stdout."),
 ]
-
-
-def versions(*more: str) -> dict[str, str]:
-    """Returns the versions of the packages that a cycle's figures depend on.
-
-    Args:
-        more: Names of packages beside those that every cycle uses.
-    """
-    names = ("painter", "drake", *more, "numpy", "scipy", "open3d")
-    return {name: importlib.metadata.version(name) for name in names}
 
 
 def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
@@ -75,8 +126,17 @@ def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
         typer.echo(f"{name:<{width}}  {text}")
 
 
-def print_summary(figures: dict, out: Path) -> None:
-    """Prints the figures of a run that matter most."""
+def print_run(figures: Mapping[str, Any], out: Path, *, as_json: bool) -> None:
+    """Prints the figures of a run, all of them as JSON or else those that matter most.
+
+    Args:
+        figures: The content of report.json.
+        out: The run folder.
+        as_json: Whether all of them are printed, as one JSON object.
+    """
+    if as_json:
+        print_result(figures, as_json=True)
+        return
     names = (
         "result",
         "motion_time_s",
@@ -94,47 +154,48 @@ def print_summary(figures: dict, out: Path) -> None:
     print_result(summary | {"report": str(out / "report.html")}, as_json=False)
 
 
-IncludeOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--include",
-        metavar="X,Y,X,Y...",
-        help="Paint only inside such zones: two opposite corners of a rectangle or the "
-        "corners of a polygon, m from the lower left corner; repeatable.",
-    ),
-]
-ExcludeOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--exclude",
-        metavar="X,Y,X,Y...",
-        help="Leave this zone clean; given as for --include; repeatable.",
-    ),
-]
+def print_error(message: str, code: str) -> None:
+    """Prints the one line on stderr with which a command fails."""
+    line = " ".join(message.split())
+    label = typer.style("error:", fg=typer.colors.RED, bold=True)
+    typer.echo(f"painter: {label} {line} [{code}]", err=True)
 
 
-def operator_zones(
+def fail_unless_done(figures: Mapping[str, Any]) -> None:
+    """Ends a command whose printed figures are of a run that did not come to DONE.
+
+    The cause is one line on stderr; on stdout there are the figures already.
+    """
+    if figures["result"] != "DONE":
+        cause = figures["cause"] or "no cause is known."
+        print_error(f"{figures['result']}: {cause}", figures["code"] or "PNT-USE-050")
+        raise typer.Exit(1)
+
+
+def parse_zones(
     include: Sequence[str] | None,
     exclude: Sequence[str] | None,
     width: float,
     height: float,
-) -> list[ZoneConfig]:
+) -> "list[ZoneConfig]":
     """Reads the zones of --include and --exclude.
 
     Args:
-        include: Words of --include.
-        exclude: Words of --exclude.
+        include: Arguments of --include.
+        exclude: Arguments of --exclude.
         width: Of the tile or wall that they are on, m.
         height: Of the same, m.
 
     Raises:
-        InputError: A zone is none, or not on the tile; names option, value and bound.
+        InputError: A zone is malformed or not on the tile; names option, value, bound.
     """
+    from painter.planning.config import ZoneConfig
+
     zones = []
-    for kind, words in (("include", include), ("exclude", exclude)):
-        for word in words or ():
-            name = f"--{kind} {word!r}"
-            zone = ZoneConfig(kind=kind, corners=mark_corners(f"--{kind}", word))
+    for kind, arguments in (("include", include), ("exclude", exclude)):
+        for argument in arguments or ():
+            name = f"--{kind} {argument!r}"
+            zone = ZoneConfig(kind=kind, corners=parse_corners(f"--{kind}", argument))
             try:
                 zone.validate(name)
                 zone.require_on(width, height, name)
@@ -144,12 +205,12 @@ def operator_zones(
     return zones
 
 
-def mark_corners(option: str, word: str) -> list[list[float]]:
-    """Reads a mark on the tile from the command line.
+def parse_corners(option: str, argument: str) -> list[list[float]]:
+    """Reads the corners of an area on the tile.
 
     Args:
         option: Name of the option, for messages.
-        word: "X,Y,X,Y...", m.
+        argument: "X,Y,X,Y...", m.
 
     Returns:
         Corners [x, y]: two opposite ones of a rectangle, or all of a polygon.
@@ -158,13 +219,15 @@ def mark_corners(option: str, word: str) -> list[list[float]]:
         InputError: It is not two or more pairs of numbers.
     """
     try:
-        numbers = [float(text) for text in word.split(",")]
+        numbers = [float(text) for text in argument.split(",")]
     except ValueError as error:
-        raise InputError(f"{option} {word!r}: {error}.", code="PNT-USE-010") from error
+        raise InputError(
+            f"{option} {argument!r}: {error}.", code="PNT-USE-010"
+        ) from error
     if len(numbers) < 4 or len(numbers) % 2:
         raise InputError(
-            f"{option} {word!r}: expected two or more pairs X,Y, got {len(numbers)} "
-            "numbers.",
+            f"{option} {argument!r}: expected two or more pairs X,Y, got "
+            f"{len(numbers)} numbers.",
             code="PNT-USE-011",
         )
     return [numbers[i : i + 2] for i in range(0, len(numbers), 2)]
@@ -175,11 +238,15 @@ def progress(description: str) -> Iterator[Callable[[float, str], None]]:
     """Shows a progress bar on stderr while the block runs.
 
     Args:
-        description: What is being done.
+        description: The work.
 
     Yields:
-        A function `show(share, text)`: the share done, 0 to 1, and what is done now.
+        A function `show(share, text)`: share of the work done, 0 to 1, and the step
+        that begins.
     """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -196,7 +263,7 @@ def progress(description: str) -> Iterator[Callable[[float, str], None]]:
 
 @contextmanager
 def output_folder(folder: Path) -> Iterator[Path]:
-    """Gives a folder to write to that takes its name only when all went well.
+    """Gives a folder to write to that takes its name only when the block succeeds.
 
     The block writes to a hidden folder beside `folder`. When it ends without an
     exception, the files move to `folder`, where they replace files of the same names;
@@ -213,7 +280,7 @@ def output_folder(folder: Path) -> Iterator[Path]:
     """
     if folder.exists() and not folder.is_dir():
         raise InputError(
-            f"--out {folder}: there is a file of that name.", code="PNT-USE-012"
+            f"--out {folder}: is a file; give a folder.", code="PNT-USE-012"
         )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -1,32 +1,33 @@
-"""The `painter` command: finds the subcommand, maps errors to exit codes."""
+"""The `painter` command: finds the subcommand, maps errors to exit status."""
 
 import importlib
 import inspect
+import json
 import logging
 import re
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from painter.cli.common import print_error
 from painter.errors import PainterError
 from perception.errors import PerceptionError
 
 # Every command is the function of its name in the module of its name beside this one.
 COMMANDS = {
-    "simulate": "Simulate the whole paint cycle in Drake.",
-    "segment": "Segment a recorded cloud or depth image into wall and rest.",
-    "map": "Map a recorded RGB-D sequence: poses and one surface.",
-    "calibrate": "Find the camera's mount from pictures and joint positions.",
+    "simulate": "Simulate a whole paint cycle in Drake.",
+    "segment": "Segment a recorded cloud or depth image.",
+    "map": "Map a recorded RGB-D sequence: camera poses and one surface.",
+    "calibrate": "Calibrate the camera's mount from pictures and joint positions.",
     "plan": "Plan the paint program of a segmented wall.",
-    "place": "Propose where the base stands to paint a tile or a wall.",
+    "place": "Propose base positions for painting a tile or a wall.",
     "deploy": "Paint with the robot, over its CAN bus.",
     "drives": "Run simulated CiA 402 drives on a CAN interface.",
-    "canlog": "Show a log of the bus in CiA 402 words.",
+    "canlog": "Show a log of the bus in CiA 402 terms.",
     "report": "Rebuild the report page of a run.",
 }
 
@@ -39,12 +40,11 @@ EXIT_INTERRUPTED = 130
 class LazyGroup(TyperGroup):
     """Imports a command's module only when that command is called.
 
-    So `painter --help` does not wait for Drake and Open3D, and a command whose
-    dependencies are missing does not take the others with it.
+    A command whose dependencies are missing does not take the others with it.
     """
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
-        """Returns name, real command and remaining words; fails for an unknown name."""
+        """Returns name, real command and remaining arguments."""
         name, _, rest = super().resolve_command(ctx, args)
         module = importlib.import_module(f"painter.cli.{name}")
         function = getattr(module, str(name))
@@ -65,15 +65,17 @@ app = typer.Typer(
 
 
 def _placeholder() -> None:
-    """Stands for a command in the list of commands; `LazyGroup` swaps it."""
+    """Stands for a command in the list of commands; `LazyGroup` replaces it."""
 
 
 for _name, _summary in COMMANDS.items():
     app.command(_name, help=_summary)(_placeholder)
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        from importlib.metadata import version
+
         typer.echo(f"painter {version('painter')}")
         raise typer.Exit
 
@@ -81,7 +83,8 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def _root(
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Log what is done to stderr.")
+        bool,
+        typer.Option("--verbose", "-v", help="Log progress and details to stderr."),
     ] = False,
     show_version: Annotated[
         bool,
@@ -93,7 +96,7 @@ def _root(
         ),
     ] = False,
 ) -> None:
-    """Look at a wall, work out what to paint, and paint it.
+    """Scan a wall, find out what to paint, and paint it.
 
     Exit status: 0 done, 1 failed or aborted job, 2 wrong use or unusable input.
     """
@@ -111,26 +114,26 @@ def run(arguments: Sequence[str]) -> int:
     """Runs the command line.
 
     Args:
-        arguments: The words after `painter`; none asks for help.
+        arguments: What follows `painter`; nothing asks for help.
 
     Returns:
-        The exit status. Errors of Painter's own and wrong use are one line on stderr;
-        any other exception is a bug and passes through.
+        The exit status. Painter's own errors and wrong use are one line on stderr and,
+        with --json, one JSON object on stdout; any other exception is a bug and passes
+        through.
     """
+    arguments = list(arguments) or ["--help"]
     try:
-        words = list(arguments) or ["--help"]
-        code = app(words, prog_name="painter", standalone_mode=False)
+        status = app(arguments, prog_name="painter", standalone_mode=False)
     except typer.TyperException as error:
-        _print_error(error.format_message())
-        return EXIT_INPUT
+        message = error.format_message()
+        return _fail(arguments, message, code="PNT-USE-055", status=EXIT_INPUT)
     except (PainterError, PerceptionError) as error:
-        _print_error(f"{error} [{error.code}]")
-        return error.exit_code
+        return _fail(arguments, str(error), code=error.code, status=error.exit_code)
     except (KeyboardInterrupt, typer.Abort):
-        code = EXIT_INTERRUPTED
-    if code == EXIT_INTERRUPTED:
-        _print_error("interrupted.")
-    return code if isinstance(code, int) else EXIT_DONE
+        status = EXIT_INTERRUPTED
+    if status == EXIT_INTERRUPTED:
+        return _fail(arguments, "interrupted.", code="PNT-USE-056", status=status)
+    return status if isinstance(status, int) else EXIT_DONE
 
 
 def main() -> None:
@@ -138,7 +141,14 @@ def main() -> None:
     sys.exit(run(sys.argv[1:]))
 
 
-def _print_error(message: str) -> None:
-    line = " ".join(message.split())
-    label = typer.style("error:", fg=typer.colors.RED, bold=True)
-    typer.echo(f"painter: {label} {line}", err=True)
+def _fail(arguments: Sequence[str], message: str, *, code: str, status: int) -> int:
+    """Prints an error and returns the exit status."""
+    print_error(message, code)
+    if "--json" in arguments:
+        error = {
+            "code": code,
+            "message": " ".join(message.split()),
+            "exit_status": status,
+        }
+        typer.echo(json.dumps({"error": error}, indent=2))
+    return status

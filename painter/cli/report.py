@@ -6,23 +6,22 @@ from typing import Annotated
 import typer
 
 from painter.cli.common import JsonOption, print_result
-from painter.run.folder import folder as files
-from painter.run.folder.folder import RunFolder
-from painter.run.page.catalog import FIGURES
-from painter.run.page.report import write_report
+
+FolderArgument = Annotated[
+    Path, typer.Argument(metavar="DIR", help="Run folder, complete or not.")
+]
 
 
-def report(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Run folder, complete or not.")
-    ],
-    as_json: JsonOption = False,
-) -> None:
-    """Rebuild report.json and report.html of a run from the run's other files.
+def report(folder: FolderArgument, as_json: JsonOption = False) -> None:
+    """Rebuild report.json and report.html of a run from its other files.
 
     Raises:
         InputError: There is no such run folder, or a file in it cannot be read.
     """
+    from painter.run.folder.folder import PAGE, RunFolder
+    from painter.run.page.catalog import FIGURES
+    from painter.run.page.report import write_report
+
     figures = write_report(RunFolder.open(folder))
     if as_json:
         print_result(figures, as_json=True)
@@ -32,5 +31,5 @@ def report(
         for info in FIGURES
         if info.value(figures) is not None
     }
-    page = {"page": str(folder / files.PAGE)}
+    page = {"page": str(folder / PAGE)}
     print_result({"result": figures["result"]} | known | page, as_json=False)

@@ -1,13 +1,12 @@
-"""`painter segment`: a recorded cloud or depth image to wall and rest."""
+"""`painter segment`: a recorded cloud or depth image to wall and other regions."""
 
+import enum
 import math
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from painter.cli.common import (
     JsonOption,
@@ -16,161 +15,258 @@ from painter.cli.common import (
     output_folder,
     print_result,
 )
-from painter.cli.recorded_input import (
-    Unit,
-    parse_direction,
-    parse_point,
-    parse_tile,
-    read_input,
-)
-from painter.config import load_scenario
 from painter.errors import InputError
-from painter.run.page.recorded_wall import write_recorded_wall
-from perception.config import SegmentationConfig
-from perception.recorded.segment_recorded import MAX_CELLS, segment_recorded
+
+
+class Unit(enum.StrEnum):
+    """A unit of length."""
+
+    M = "m"
+    CM = "cm"
+    MM = "mm"
+
+
+METRES = {Unit.M: 1.0, Unit.CM: 0.01, Unit.MM: 0.001}
+
+CloudArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="CLOUD",
+        help="PLY, PCD, XYZ, NPY or NPZ file; 16-bit depth PNG, or a folder of them "
+        "from a camera and scene at rest; RealSense .bag or .db3 recording.",
+    ),
+]
+IntrinsicsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="JSON",
+        help="Camera of a depth PNG: width, height, fx, fy, cx, cy, in px.  "
+        "[default: intrinsics.json beside it]",
+    ),
+]
+UpOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="AXIS",
+        help="Up direction in the cloud's frame: z, -y or X,Y,Z. With it floors and "
+        "ceilings are not taken for walls.  [default: -y, as in a camera's frame]",
+    ),
+]
+UnitOption = Annotated[Unit, typer.Option(help="Unit of a cloud's coordinates.")]
+ViewpointOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z",
+        help="Position of the sensor in the cloud's frame, m; tells the wall's front "
+        "from its back.  [default: from the PCD file, else the origin; for a map far "
+        "from its origin, the side opposite to its recesses]",
+    ),
+]
+TileOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WxH",
+        help="Size of the tile, m, centred on the visible wall.  [default: the whole "
+        "wall]",
+    ),
+]
+CellOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Edge of a grid cell, m.  [default: 0.01, or larger for sparse points and "
+        "for walls of more than 4 million cells, 400 000 with --fine]"
+    ),
+]
+InlierOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Greatest distance of a wall point from the wall's plane, m.  [default: "
+        "four standard deviations of the noise, 0.006 to 0.03]"
+    ),
+]
+SetBackOption = Annotated[
+    float,
+    typer.Option(
+        help="Greatest distance behind the plane, m, at which parts beside it, such as "
+        "dormers, still count as wall."
+    ),
+]
+FineOption = Annotated[
+    bool,
+    typer.Option(
+        "--fine",
+        help="Segment by fine steps against the wall's curved surface, as the robot "
+        "does: steps of 10 mm are found and bulges stay wall. For dense depth images. "
+        "Adds surface, normals, confidence, reasons and outlines of openings. Without "
+        "it, all points within --inlier-distance of the plane are wall (the paper's "
+        "method).",
+    ),
+]
+DistanceOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Expected distance of the wall from the sensor, m.  [default: any]"
+    ),
+]
+MaxRangeOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Ignore points farther than this from the sensor, m.  [default: none]"
+    ),
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Random seed of RANSAC.")]
 
 
 def segment(
-    cloud: Annotated[
-        Path,
-        typer.Argument(
-            metavar="CLOUD",
-            help="PLY, PCD, XYZ, NPY or NPZ file; 16-bit depth PNG, or a folder of "
-            "them from a camera and scene at rest; RealSense .bag or .db3 recording.",
-        ),
-    ],
+    cloud: CloudArgument,
     out: OutOption,
-    intrinsics: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="JSON",
-            help="Camera of a depth PNG: width, height, fx, fy, cx, cy, in px.  "
-            "[default: intrinsics.json beside it]",
-        ),
-    ] = None,
-    up: Annotated[
-        str | None,
-        typer.Option(
-            metavar="AXIS",
-            help="Which way is up in the cloud's frame, as z, -y or X,Y,Z; then floors "
-            "are no walls. Without it the mask is turned as in a camera's picture "
-            "(up = -y).",
-        ),
-    ] = None,
-    unit: Annotated[Unit, typer.Option(help="Unit of a cloud's numbers.")] = Unit.M,
-    viewpoint: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z",
-            help="Where the sensor was, in the cloud's frame, m; tells the wall's "
-            "front from its back.  [default: as a PCD file says; the origin; of a map "
-            "far from its origin, the side that openings do not lie on]",
-        ),
-    ] = None,
-    tile: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WxH",
-            help="Size of the tile, centred on the wall seen, m.  [default: all of it]",
-        ),
-    ] = None,
-    cell: Annotated[
-        float | None,
-        typer.Option(
-            help="Edge of a grid cell, m.  [default: 0.01, or as the points' spacing "
-            "needs, or for at most 4 million cells, 400 000 by --fine]"
-        ),
-    ] = None,
-    inlier_distance: Annotated[
-        float | None,
-        typer.Option(
-            help="How far a point of the wall may be from its plane, m.  [default: "
-            "four standard deviations of its noise, 0.006 to 0.03]"
-        ),
-    ] = None,
-    set_back: Annotated[
-        float,
-        typer.Option(
-            help="How far behind the plane parts of the wall may lie that stand beside "
-            "it, such as dormers, m."
-        ),
-    ] = 0.0,
-    fine: Annotated[
-        bool,
-        typer.Option(
-            "--fine",
-            help="Draw the mask by fine steps against the wall's own surface, as the "
-            "robot does: what rises 10 mm from it is no wall, and what bulges with it "
-            "is; for dense depth images. Adds surface, normals, confidence, reasons "
-            "and outlines of openings. Without it the mask is drawn by the paper's "
-            "steps: all within --inlier-distance of a plane.",
-        ),
-    ] = False,
-    distance: Annotated[
-        float | None,
-        typer.Option(
-            help="Expected distance of the wall from the sensor, m.  [default: any]"
-        ),
-    ] = None,
-    max_range: Annotated[
-        float | None,
-        typer.Option(
-            help="Leave out points farther than this from the sensor, m.  "
-            "[default: none]"
-        ),
-    ] = None,
+    intrinsics: IntrinsicsOption = None,
+    up: UpOption = None,
+    unit: UnitOption = Unit.M,
+    viewpoint: ViewpointOption = None,
+    tile: TileOption = None,
+    cell: CellOption = None,
+    inlier_distance: InlierOption = None,
+    set_back: SetBackOption = 0.0,
+    fine: FineOption = False,
+    distance: DistanceOption = None,
+    max_range: MaxRangeOption = None,
     overrides: SetOption = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of random draws.")] = 1,
+    seed: SeedOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Segment a recorded cloud or depth image into wall and rest.
+    """Segment a recorded cloud or depth image into wall and other regions.
 
     Writes segmentation.npz, segmentation.json, segmentation.png and wall_mask.png.
     """
-    width, height = (None, None) if tile is None else parse_tile(tile)
-    _check_positive(
+    options: dict[str, Any] = _lengths(
         cell=cell,
         inlier_distance=inlier_distance,
         distance=distance,
         max_range=max_range,
     )
+    options |= _parsed(tile, up, viewpoint, set_back)
+    from painter.config import load_scenario
+    from painter.run.page.recorded_wall import write_recorded_wall
+    from perception.recorded.segment_file import segment_file
+
+    config = load_scenario("blank", overrides or ()).segmentation
+    for name, field in (("cell", "cell"), ("inlier_distance", "distance_threshold")):
+        if options[name] is None and _is_set(overrides, f"segmentation.{field}"):
+            options[name] = getattr(config, field)
+    wall = segment_file(
+        cloud,
+        config=config,
+        intrinsics=intrinsics,
+        unit=METRES[unit],
+        fine=fine,
+        seed=seed,
+        **options,
+    )
+    with output_folder(out) as folder:
+        figures = write_recorded_wall(folder, wall, title=cloud.name)
+    _print_figures(figures, out, as_json=as_json)
+
+
+def _lengths(**values: float | None) -> dict[str, float | None]:
+    """Returns the options that are lengths, m, checked."""
+    for name, value in values.items():
+        if value is not None and not 0.0 < value < math.inf:
+            option = "--" + name.replace("_", "-")
+            raise InputError(
+                f"{option} must be > 0 m, got {value!r}.", code="PNT-USE-047"
+            )
+    return values
+
+
+def _parsed(
+    tile: str | None, up: str | None, viewpoint: str | None, set_back: float
+) -> dict[str, Any]:
+    """Returns the options that are read from text, and the set-back, checked."""
     if not 0.0 <= set_back < math.inf:
         raise InputError(
             f"--set-back must be >= 0 m, got {set_back!r}.", code="PNT-USE-046"
         )
-    words = list(overrides or ())
-    if cell is not None:
-        words.append(f"segmentation.cell={cell!r}")
-    if inlier_distance is not None:
-        words.append(f"segmentation.distance_threshold={inlier_distance!r}")
-    config = load_scenario("blank", words).segmentation
-    if width is not None and height is not None:
-        _check_grid(width, height, config)
-    up_W = None if up is None else parse_direction(up)
-    place = None if viewpoint is None else parse_point(viewpoint)
-    recording = read_input(cloud, intrinsics=intrinsics, unit=unit)
-    p_WC = recording.p_WC if place is None else place
-    points = recording.p_WQs
-    if max_range is not None:
-        with np.errstate(over="ignore"):
-            offsets = points - (np.zeros(3) if p_WC is None else p_WC)[:, None]
-            points = points[:, np.linalg.norm(offsets, axis=0) <= max_range]
-    wall = segment_recorded(
-        points,
-        width=width,
-        height=height,
-        config=config,
-        seed=seed,
-        up_W=up_W,
-        distance=distance,
-        p_WC=p_WC,
-        fit_cell=not _is_set(words, "cell"),
-        fit_inlier_distance=not _is_set(words, "distance_threshold"),
-        set_back=set_back,
-        fine=fine,
-    )
-    with output_folder(out) as folder:
-        figures = write_recorded_wall(folder, wall, title=cloud.name)
+    import numpy as np
+
+    return {
+        "set_back": set_back,
+        "tile": None if tile is None else parse_tile(tile),
+        "up": None if up is None else np.array(parse_direction(up)),
+        "viewpoint": None if viewpoint is None else np.array(parse_point(viewpoint)),
+    }
+
+
+def parse_direction(argument: str) -> list[float]:
+    """Reads a direction: an axis, such as "z" or "-y", or "X,Y,Z".
+
+    Returns:
+        Unit vector [x, y, z].
+
+    Raises:
+        InputError: It is neither, or of no length.
+    """
+    axis = argument.strip().lower().lstrip("+")
+    if axis.removeprefix("-") in ("x", "y", "z"):
+        sign = -1.0 if axis.startswith("-") else 1.0
+        return [sign * (name == axis[-1]) for name in "xyz"]
+    vector = _three_numbers(argument) or [0.0]
+    length = math.hypot(*vector)
+    if not 0.0 < length < math.inf:
+        raise InputError(
+            f"--up must be x, -x, ... -z or X,Y,Z, got {argument!r}.",
+            code="PNT-USE-037",
+        )
+    return [value / length for value in vector]
+
+
+def parse_point(argument: str) -> list[float]:
+    """Reads a point: "X,Y,Z", m.
+
+    Raises:
+        InputError: It is not three numbers.
+    """
+    point = _three_numbers(argument)
+    if point is None:
+        raise InputError(
+            f"--viewpoint must be X,Y,Z in m, got {argument!r}.", code="PNT-USE-038"
+        )
+    return point
+
+
+def parse_tile(argument: str) -> tuple[float, float]:
+    """Reads the size of a tile: "WxH", m.
+
+    Returns:
+        Width and height, m.
+
+    Raises:
+        InputError: It is not two positive numbers.
+    """
+    try:
+        width, height = (float(number) for number in argument.lower().split("x"))
+    except ValueError:
+        raise InputError(
+            f"--tile must be WxH in m, e.g. 2x2, got {argument!r}.", code="PNT-USE-039"
+        ) from None
+    if not (0.0 < width < math.inf and 0.0 < height < math.inf):
+        raise InputError(f"--tile must be > 0 m, got {argument!r}.", code="PNT-USE-040")
+    return width, height
+
+
+def _three_numbers(argument: str) -> list[float] | None:
+    try:
+        numbers = [float(number) for number in argument.split(",")]
+    except ValueError:
+        return None
+    return numbers if len(numbers) == 3 and all(map(math.isfinite, numbers)) else None
+
+
+def _is_set(overrides: Sequence[str] | None, key: str) -> bool:
+    return any(override.partition("=")[0] == key for override in overrides or ())
+
+
+def _print_figures(figures: dict[str, Any], out: Path, *, as_json: bool) -> None:
     if as_json:
         print_result(figures, as_json=True)
         return
@@ -180,41 +276,15 @@ def segment(
         if not isinstance(value, list | dict)
     }
     print_result(short, as_json=False)
-    Console().print(_table(figures["regions"]))
+    _print_regions(figures["regions"])
     typer.echo(f"written to {out}")
 
 
-def _check_positive(**values: float | None) -> None:
-    for name, value in values.items():
-        if value is not None and not 0.0 < value < math.inf:
-            option = "--" + name.replace("_", "-")
-            raise InputError(
-                f"{option} must be > 0 m, got {value!r}.", code="PNT-USE-047"
-            )
+def _print_regions(regions: list[dict[str, Any]], most: int = 10) -> None:
+    from rich.console import Console
+    from rich.table import Table
 
-
-def _is_set(words: list[str], field: str) -> bool:
-    """Tells whether the words set a field of the segmentation."""
-    return any(word.partition("=")[0] == f"segmentation.{field}" for word in words)
-
-
-def _check_grid(width: float, height: float, config: SegmentationConfig) -> None:
-    cell = config.cell
-    if min(width, height) < cell:
-        raise InputError(
-            f"--tile {width:g}x{height:g} is smaller than a cell, {cell:g} m.",
-            code="PNT-USE-048",
-        )
-    if width * height / cell**2 > MAX_CELLS:
-        raise InputError(
-            f"--tile {width:g}x{height:g} with cells of {cell:g} m has more than "
-            f"{MAX_CELLS:.0e} cells; take a larger --cell.",
-            code="PNT-USE-049",
-        )
-
-
-def _table(regions: list[dict[str, float | None]], most: int = 10) -> Table:
-    table = Table("region", "what", "area, m²", "depth, m", title=None, box=None)
+    table = Table("region", "kind", "area, m²", "depth, m", title=None, box=None)
     for region in regions[:most]:
         depth = region["median_depth_m"]
         table.add_row(
@@ -225,4 +295,4 @@ def _table(regions: list[dict[str, float | None]], most: int = 10) -> Table:
         )
     if len(regions) > most:
         table.caption = f"and {len(regions) - most} smaller ones"
-    return table
+    Console().print(table)

@@ -247,6 +247,14 @@ class Scene:
             _check_range(f"{where}.position", "m", wall.y, wall.y + wall.height, y=y)
             _check_range(f"{where}.position", "m", -wall.thickness, 0.5, z=z)
 
+    def opening_boxes(self) -> list[list[list[float]]]:
+        """Returns corners [x, y] of each opening, m from the wall's lower left one."""
+        boxes = []
+        for opening in self.openings:
+            x, y = opening.x - self.wall.x, opening.y - self.wall.y
+            boxes.append([[x, y], [x + opening.width, y + opening.height]])
+        return boxes
+
     def _check_place(self, opening: OpeningConfig, where: str) -> None:
         wall = self.wall
         depth = opening.recess + opening.frame_depth

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from painter.canopen.master.feedback import BusState
-from painter.canopen.sim.rack import Fault
+from painter.canopen.sim.faults import Fault
 from painter.cycle.deploy import DeployCycle
 from painter.cycle.true_wall import true_segmentation
 from painter.planning.program.program import strokes_from

@@ -58,7 +58,7 @@ def test_the_mount_is_found_and_written(recording, tmp_path, capsys):
     np.testing.assert_allclose(report["rotation_deg"], TURN_DEG, atol=0.05)
     np.testing.assert_allclose(report["translation_m"][:2], SHIFT[:2], atol=1e-3)
     assert report["pictures"] == 20
-    # The words it gives are understood, and hold the answer.
+    # The overrides it gives are valid, and hold the result.
     scenario = load_scenario("blank", report["set"])
     assert scenario.wall_camera.calibrated_deg == report["rotation_deg"]
 
@@ -67,8 +67,8 @@ def test_the_mount_is_found_and_written(recording, tmp_path, capsys):
     ("text", "message"),
     [
         (None, "joints.txt: no such file"),
-        ("0.0 1 2 3 4\n", "line 1 is no time and five positions"),
-        ("1 0 0 0 0 0\n1 0 0 0 0 0\n", "line 2 is not after the one before"),
+        ("0.0 1 2 3 4\n", "line 1 is not a time and five positions"),
+        ("1 0 0 0 0 0\n1 0 0 0 0 0\n", "line 2: time must be after the line before"),
         ("# nothing\n", "holds no joint positions"),
     ],
 )

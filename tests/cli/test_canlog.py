@@ -9,7 +9,8 @@ from painter.canopen.config.bus_file import load_bus
 from painter.canopen.master.arm_bus import ArmBus
 from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
-from painter.canopen.sim.rack import Fault, Rack
+from painter.canopen.sim.faults import Fault
+from painter.canopen.sim.rack import Rack
 from painter.canopen.wire.candump import LogRecord, format_record
 from painter.cli.main import run
 from painter.resources import models_path

@@ -56,7 +56,7 @@ def test_files_of_an_earlier_result_are_replaced_and_others_kept(tmp_path):
 def test_a_file_in_the_way_is_an_input_error(tmp_path):
     (tmp_path / "out").write_text("a file")
     with (
-        pytest.raises(InputError, match="there is a file"),
+        pytest.raises(InputError, match="is a file"),
         output_folder(tmp_path / "out"),
     ):
         pass

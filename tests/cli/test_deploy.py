@@ -1,10 +1,10 @@
-"""`painter deploy`: options that do not go together, the operator's words, speeds."""
+"""`painter deploy`: options that exclude each other, operator, speeds."""
 
 import pytest
 
-from painter.cli.deploy import slowed
 from painter.cli.main import run
 from painter.config import load_scenario
+from painter.cycle.run_deployment import slowed
 from painter.cycle.step_by_step import StepByStep
 from painter.systems.values import Phase
 
@@ -13,7 +13,7 @@ from painter.systems.values import Phase
     ("words", "message"),
     [
         (["--speed", "0.3"], "needs --dry-run; the film would be 3.3 times as thick"),
-        (["cubes", "--resume", "runs/none"], "the scenario is that of"),
+        (["cubes", "--resume", "runs/none"], "has a scenario of its own"),
         (["--resume", "runs/none"], "no such folder"),
         (["nowhere"], "scenario 'nowhere' is unknown"),
         (["--bus", "none.yaml"], "no such bus file"),

@@ -1,6 +1,6 @@
-"""The command line's frame: list of commands, errors, exit codes, lazy imports."""
+"""The command line's frame: list of commands, errors, exit status."""
 
-import subprocess
+import json
 import sys
 import types
 from importlib.metadata import version
@@ -9,6 +9,7 @@ import pytest
 import typer
 
 from painter.cli import main
+from painter.cli.common import JsonOption, fail_unless_done, print_result
 from painter.errors import FaultError, InputError, PainterError
 from perception.errors import CloudReadError, NoWallError
 
@@ -31,17 +32,6 @@ def test_help_lists_every_command_with_its_summary(words, capsys):
     for name, summary in main.COMMANDS.items():
         assert name in text
         assert summary in text
-
-
-def test_help_loads_neither_drake_nor_open3d():
-    code = (
-        "import sys; from painter.cli.main import run; run(['--help']);"
-        "print(sorted({'pydrake', 'open3d', 'scipy', 'can'} & set(sys.modules)))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_version_is_the_installed_one(capsys):
@@ -92,6 +82,61 @@ def test_errors_of_painters_own_are_one_line(error, code, command, capsys):
     assert capsys.readouterr().err == f"painter: error: {text} [PNT-TEST-001]\n"
 
 
+def test_with_json_an_error_is_one_object_on_stdout(command, capsys):
+    def plan(as_json: JsonOption = False) -> None:
+        """Plan."""
+        raise InputError("cloud.ply: no\nsuch file.", code="PNT-TEST-001")
+
+    command(plan)
+    assert main.run(["plan", "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {
+        "error": {
+            "code": "PNT-TEST-001",
+            "message": "cloud.ply: no such file.",
+            "exit_status": 2,
+        }
+    }
+    assert err == "painter: error: cloud.ply: no such file. [PNT-TEST-001]\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "code"),
+    [
+        (["plan", "--json", "--frob"], 2, "PNT-USE-055"),
+        (["plan", "--json"], 130, "PNT-USE-056"),
+    ],
+)
+def test_with_json_wrong_use_and_interrupts_have_codes_too(
+    words, status, code, command, capsys
+):
+    def plan(as_json: JsonOption = False) -> None:
+        """Plan."""
+        raise KeyboardInterrupt
+
+    command(plan)
+    assert main.run(words) == status
+    out, err = capsys.readouterr()
+    error = json.loads(out)["error"]
+    assert (error["code"], error["exit_status"]) == (code, status)
+    assert err == f"painter: error: {error['message']} [{code}]\n"
+
+
+def test_a_job_that_failed_prints_its_figures_and_no_second_object(command, capsys):
+    figures = {"result": "FAULT", "cause": "drive 2.", "code": "PNT-TEST-001"}
+
+    def plan(as_json: JsonOption = False) -> None:
+        """Plan."""
+        print_result(figures, as_json=as_json)
+        fail_unless_done(figures)
+
+    command(plan)
+    assert main.run(["plan", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert json.loads(out) == figures
+    assert err == "painter: error: FAULT: drive 2. [PNT-TEST-001]\n"
+
+
 def test_a_bug_is_not_hidden(command):
     def plan() -> None:
         """Plan."""
@@ -109,7 +154,7 @@ def test_interrupt_is_130(command, capsys):
 
     command(plan)
     assert main.run(["plan"]) == 130
-    assert capsys.readouterr().err == "painter: error: interrupted.\n"
+    assert capsys.readouterr().err == "painter: error: interrupted. [PNT-USE-056]\n"
 
 
 def test_a_command_may_set_the_exit_status(command):

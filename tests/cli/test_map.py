@@ -90,7 +90,7 @@ def test_a_session_is_joined_onto_a_map(tmp_path, capsys):
     ("words", "message"),
     [
         (["--set", "mapping.nothing=1"], "expected mapping.KEY=VALUE"),
-        (["--set", "mapping.cell=wide"], "'wide' is no number"),
+        (["--set", "mapping.cell=wide"], "'wide' is not a number"),
         (["--set", "mapping.cell=-1"], "mapping.cell must be > 0"),
         (["--poses", "no_such_file.txt"], "no such file"),
         (["--voxels", "0"], "--voxels must be > 0 m, got 0.0"),

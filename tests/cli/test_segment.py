@@ -103,7 +103,7 @@ def test_depth_image_is_taken(tmp_path):
         (["--inlier-distance", "nan"], "--inlier-distance must be > 0 m"),
         (["--unit", "mile"], "'mile' is not one of"),
         (["--set", "segmentation.nonsense=1"], "nonsense"),
-        (["--intrinsics", "camera.json"], "--intrinsics is for a depth PNG"),
+        (["--intrinsics", "camera.json"], "is no depth PNG and takes no intrinsics"),
     ],
 )
 def test_wrong_use_is_one_line_and_exit_2(cloud, tmp_path, capsys, words, message):

@@ -17,8 +17,8 @@ def earlier(tmp_path):
 def test_options_that_do_not_fit_are_refused(earlier, tmp_path, capsys):
     for words, text in (
         (["--resume", earlier, "--touch-up", earlier], "only one of them"),
-        (["--clear", "0,0,1,1"], "goes with --touch-up alone"),
-        (["cubes", "--resume", earlier], "the scenario is that of"),
+        (["--clear", "0,0,1,1"], "--clear: needs --touch-up"),
+        (["cubes", "--resume", earlier], "has a scenario of its own"),
         (["--resume", str(tmp_path / "none")], "no such folder"),
         (["--resume", earlier], "was not stopped"),
         (["--resume", earlier, "--seed", "7"], "--set random_seed: must be that of"),
@@ -33,4 +33,4 @@ def test_options_that_do_not_fit_are_refused(earlier, tmp_path, capsys):
 
 def test_a_run_is_not_overwritten_by_what_goes_on_with_it(earlier, capsys):
     assert run(["simulate", "--resume", earlier, "--out", earlier]) == 2
-    assert "is the run to be gone on with" in capsys.readouterr().err
+    assert "is the folder of the earlier run" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from painter.canopen.master.feedback import BusState
 from painter.canopen.process.robot_clock import RobotClock
-from painter.canopen.sim.rack import Fault
+from painter.canopen.sim.faults import Fault
 from painter.config import load_scenario
 from painter.cycle.bus_record import executions, robot_times
 from painter.diagrams.station import CHEAT_PREFIX, CheckStation, MakeStation

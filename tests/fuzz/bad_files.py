@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from painter.cli.recorded_input import Unit, read_input
 from painter.errors import PainterError
 from painter.run.page.recorded_wall import segmentation_figures
 from perception.config import SegmentationConfig
 from perception.errors import PerceptionError
+from perception.io.recordings import read_recording
 from perception.recorded.segment_recorded import segment_recorded
 
 TIMEOUT = 30  # s
@@ -235,7 +235,7 @@ def make(seed, folder):
 def attempt(path, *, fine):
     """Reads and segments, by fine steps or not; returns the outcome."""
     try:
-        cloud = read_input(path, intrinsics=None, unit=Unit.M)
+        cloud = read_recording(path)
         found = segment_recorded(
             cloud.p_WQs,
             config=SegmentationConfig(),

@@ -6,7 +6,8 @@ import pytest
 from painter.canopen.config.bus_file import load_bus
 from painter.canopen.master.arm_bus import ArmBus
 from painter.canopen.master.feedback import BusState
-from painter.canopen.sim.rack import Fault, Rack
+from painter.canopen.sim.faults import Fault
+from painter.canopen.sim.rack import Rack
 from painter.config import load_scenario
 from painter.rehearsal.arm_load import ArmLoad
 from painter.resources import models_path

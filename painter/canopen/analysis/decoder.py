@@ -4,9 +4,9 @@ Source: CiA 301 v4.2.0, 7.2 (services) and 7.3.5 (pre-defined connection set); L
 include/uapi/linux/can/error.h (error frames).
 """
 
-import enum
 from dataclasses import dataclass
 
+from painter.canopen.analysis.kinds import Kind
 from painter.canopen.analysis.object_names import object_text
 from painter.canopen.analysis.value_text import ValueFormatter
 from painter.canopen.config.bus_config import BusConfig
@@ -52,20 +52,6 @@ _ERRORS = {
 }
 # Objects whose changes are news; positions always change.
 _NEWS = frozenset({0x6000, 0x6040, 0x6041, 0x6060, 0x6061, 0x6200})
-
-
-class Kind(enum.StrEnum):
-    """Kinds of frames."""
-
-    NMT = "nmt"
-    SYNC = "sync"
-    EMCY = "emcy"
-    TPDO = "tpdo"
-    RPDO = "rpdo"
-    SDO = "sdo"
-    HEARTBEAT = "heartbeat"
-    ERROR = "error"
-    OTHER = "other"
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from painter.canopen.analysis.decoder import Decoded, Kind
+from painter.canopen.analysis.decoder import Decoded
+from painter.canopen.analysis.kinds import Kind
 from painter.canopen.protocol.frames import SYNC_ID, frame_time
 from painter.canopen.wire.candump import LogRecord
 

@@ -1,6 +1,5 @@
 """All simulated nodes of a bus file on one wire, and faults by name."""
 
-import enum
 from collections import deque
 from collections.abc import Callable
 
@@ -11,6 +10,7 @@ from painter.canopen.config.units import AXES
 from painter.canopen.protocol.frames import ERROR_BUS_OFF, Frame
 from painter.canopen.protocol.nmt import NmtState
 from painter.canopen.sim.drive import SimDrive
+from painter.canopen.sim.faults import Fault
 from painter.canopen.sim.io_node import SimIo
 from painter.canopen.sim.load import Load
 from painter.canopen.sim.motor import LoadedMotor
@@ -19,24 +19,6 @@ from painter.canopen.sim.wire import Wire
 from painter.canopen.wire.transports import TransportError
 
 STEP = 0.001
-
-
-class Fault(enum.StrEnum):
-    """Faults that can be injected."""
-
-    EMCY = "emcy"  # The drive reports DC link under-voltage.
-    FOLLOWING_ERROR = "following_error"  # Something blocks the axis.
-    HEARTBEAT_LOST = "heartbeat_lost"  # The node falls silent.
-    NODE_RESET = "node_reset"  # The node reboots.
-    TPDO_SILENT = "tpdo_silent"  # Heartbeats go on, process data does not.
-    SDO_ABORT = "sdo_abort"  # The limits cannot be written.
-    WRONG_IDENTITY = "wrong_identity"  # Another product is on the node-ID.
-    WRONG_UNIT = "wrong_unit"  # The encoder has twice the counts.
-    BRAKE_STUCK = "brake_stuck"  # The brake does not open.
-    ESTOP = "estop"  # The e-stop chain opens; the axis does not count.
-    PRESSURE_LOW = "pressure_low"  # The pump stops; the axis does not count.
-    BUS_OFF = "bus_off"  # The master's controller goes bus-off.
-    INTERFACE_DOWN = "interface_down"  # The master's adapter is unplugged.
 
 
 class Rack:

@@ -2,7 +2,8 @@
 
 import pytest
 
-from painter.canopen.analysis.decoder import Decoder, Kind
+from painter.canopen.analysis.decoder import Decoder
+from painter.canopen.analysis.kinds import Kind
 from painter.canopen.analysis.log_summary import LogSummary
 from painter.canopen.analysis.value_text import (
     controlword_text,

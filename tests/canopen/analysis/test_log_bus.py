@@ -8,7 +8,7 @@ from painter.canopen.config.units import joints_from_axes
 from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.protocol.frames import SYNC_ID, Frame
-from painter.canopen.sim.rack import Fault
+from painter.canopen.sim.faults import Fault
 from painter.canopen.wire.candump import LogRecord
 from painter.errors import InputError
 

@@ -12,7 +12,7 @@ from painter.canopen.config.bus_file import load_bus
 from painter.canopen.config.device import Mode
 from painter.canopen.master.feedback import BusState
 from painter.canopen.protocol.cia402 import State
-from painter.canopen.sim.rack import Fault
+from painter.canopen.sim.faults import Fault
 from painter.errors import InputError
 from painter.resources import models_path
 

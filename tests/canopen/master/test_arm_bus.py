@@ -7,7 +7,7 @@ import pytest
 from painter.canopen.master.feedback import BusState
 from painter.canopen.master.setpoints import Setpoint
 from painter.canopen.protocol.cia402 import State
-from painter.canopen.sim.rack import Fault
+from painter.canopen.sim.faults import Fault
 from painter.errors import BusError
 
 # Commands of one cycle go out together; TPDOs and RPDOs of the next one follow.
