@@ -18,6 +18,7 @@ def test_wall_becomes_stations_before_which_the_arm_reaches_all(tmp_path, capsys
     assert 0.8 <= summary["distance"] <= 1.4
     tiles = [station["tile"] for station in document["stations"]]
     assert sum(tile[2] for tile in tiles) == pytest.approx(5.0)
+    assert [tile[3] for tile in tiles] == pytest.approx([2.0] * 3)
 
 
 def test_stations_of_a_scene_leave_its_door_and_window(tmp_path, capsys):
