@@ -216,8 +216,6 @@ ROOMS: dict[str, set[str]] = {
         "painter.planning",
         "painter.resources",
         "painter.scene",
-        "perception.io",
-        "perception.mapping",
     },
     "painter.systems": SYSTEM_VALUES
     | {"painter.errors", "painter.planning", "perception.errors", "perception.values"},
@@ -293,9 +291,6 @@ ROOMS: dict[str, set[str]] = {
         "painter.run",
         "painter.scene",
         "painter.systems",
-        "painter.timebase",
-        "perception.depth_camera",
-        "perception.io",
         "perception.values",
     },
     "painter.rehearsal": {
@@ -310,16 +305,30 @@ ROOMS: dict[str, set[str]] = {
         "painter.run",
         "painter.scene",
         "painter.systems",
-        "painter.timebase",
     },
-    # The public face stands above all but the commands.
-    "painter": {
+    "painter.jobs": {
+        "painter.camera",
+        "painter.canopen",
         "painter.config",
         "painter.cycle",
         "painter.diagrams",
         "painter.errors",
-        "painter.resources",
+        "painter.planning",
+        "painter.rehearsal",
         "painter.robot",
+        "painter.run",
+        "painter.scene",
+        "painter.systems",
+        "painter.timebase",
+        "perception",
+    },
+    # The public face stands above all but the commands.
+    "painter": {
+        "painter.config",
+        "painter.diagrams",
+        "painter.errors",
+        "painter.jobs",
+        "painter.resources",
         "painter.run",
         "painter.scene",
         "perception",

@@ -59,7 +59,7 @@ def calibrate(
     """
     config = None if board is None else _parse_board(board)
     from painter.config import load_scenario
-    from painter.robot.camera_mount import calibrate_mount
+    from painter.jobs.calibrate_mount import calibrate_mount
 
     job = load_scenario(scenario, overrides or ())
     report = calibrate_mount(frames, job, board=config)

@@ -78,7 +78,7 @@ def canlog(
 
     bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
     if replay is not None:
-        from painter.cycle.replay_bus_log import replay_bus_log
+        from painter.jobs.replay_bus_log import replay_bus_log
 
         with output_folder(replay) as folder:
             figures = replay_bus_log(log, bus, folder)

@@ -90,8 +90,8 @@ def deploy(
     _check_options(speed, rate, dry_run=dry_run, camera=camera)
     from painter.canopen.config.bus_file import load_bus
     from painter.config import load_scenario
-    from painter.cycle.run_deployment import Deployment, DeployOptions
-    from painter.cycle.run_simulation import check_other_folder
+    from painter.jobs.run_deployment import Deployment, DeployOptions
+    from painter.jobs.run_simulation import check_other_folder
     from painter.run.figures.unfinished import rest_of_run
     from painter.run.folder.folder import SCENARIO, RunFolder
 

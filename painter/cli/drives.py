@@ -23,8 +23,8 @@ from painter.errors import InputError
 from painter.resources import models_path
 
 if TYPE_CHECKING:
+    from painter.jobs.run_drives import PlannedFault
     from painter.rehearsal.hil_bench import HilBench
-    from painter.rehearsal.run_drives import PlannedFault
 
 CAMERA_SOCKET = str(Path(tempfile.gettempdir()) / "painter-camera")
 _FAULT = re.compile(r"(?P<name>\w+)(?:@(?P<axis>\w+))?:(?P<time>[0-9.]+)")
@@ -98,7 +98,7 @@ def drives(
     if scenario is None and (overrides or truth is not None):
         raise InputError("--set and --truth: need --scenario.", code="PNT-USE-020")
     from painter.canopen.config.bus_file import load_bus
-    from painter.rehearsal.run_drives import run_drives
+    from painter.jobs.run_drives import run_drives
 
     bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
     bus = dataclasses.replace(
@@ -127,7 +127,7 @@ def _bench(scenario: str, overrides: Sequence[str], camera: str) -> "HilBench":
 
 def _parse_fault(argument: str) -> "PlannedFault":
     from painter.canopen.config.units import AXES
-    from painter.rehearsal.run_drives import PlannedFault
+    from painter.jobs.run_drives import PlannedFault
 
     match = _FAULT.fullmatch(argument)
     if match is None:

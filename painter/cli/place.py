@@ -64,8 +64,8 @@ def place(
         )
     width, height = _parse_size(wall or "2x2")
     from painter.config import load_scenario
+    from painter.jobs.propose_base import propose_base_positions
     from painter.planning.config import ZoneConfig
-    from painter.robot.base_positions import propose_base_positions
     from painter.scene.load import load_scene
 
     job = load_scenario(scenario, overrides or ())

@@ -76,7 +76,7 @@ def plan(
     """
     area = None if mark is None else parse_corners("--mark", mark)
     from painter.config import load_scenario
-    from painter.cycle.plan_tile import plan_tile
+    from painter.jobs.plan_tile import plan_tile
 
     job = load_scenario(scenario, overrides or ())
     job.raster.zones += parse_zones(include, exclude, job.tile.width, job.tile.height)

@@ -81,7 +81,7 @@ def simulate(
     from pydrake.geometry import Meshcat
 
     from painter.config import load_scenario
-    from painter.cycle.run_simulation import simulate as run_simulation
+    from painter.jobs.run_simulation import simulate as run_simulation
 
     if earlier is None:
         job = load_scenario(scenario or "cubes", overrides)
@@ -122,7 +122,7 @@ def _earlier_run(
     if run is None:
         return None
     from painter.cycle.earlier_run import EarlierRun
-    from painter.cycle.run_simulation import check_other_folder
+    from painter.jobs.run_simulation import check_other_folder
 
     check_other_folder(out, run, scenario)
     if resume is not None:

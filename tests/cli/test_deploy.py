@@ -4,8 +4,8 @@ import pytest
 
 from painter.cli.main import run
 from painter.config import load_scenario
-from painter.cycle.run_deployment import slowed
 from painter.cycle.step_by_step import StepByStep
+from painter.jobs.run_deployment import slowed
 from painter.systems.values import Phase
 
 

@@ -7,7 +7,7 @@ from painter.cli.main import run
 
 def test_drives_run_for_a_while_and_say_how_it_went(tmp_path, capsys, monkeypatch):
     # In this process: other tests must not run under SCHED_FIFO.
-    monkeypatch.setattr("painter.rehearsal.run_drives.use_fifo", lambda priority: False)
+    monkeypatch.setattr("painter.jobs.run_drives.use_fifo", lambda priority: False)
     words = ["drives", "--interface", "local", "--channel", str(tmp_path / "can")]
     words += ["--duration", "0.2", "--fault", "emcy@elbow_pitch:0.1", "--json"]
     assert run(words) == 0

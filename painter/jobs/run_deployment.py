@@ -17,11 +17,11 @@ from painter.config import Scenario, dump_scenario
 from painter.cycle.cycle_log import CycleLog
 from painter.cycle.deploy import DeployCycle
 from painter.cycle.preflight import Check, preflight
-from painter.cycle.run_simulation import versions
 from painter.cycle.step_by_step import StepByStep
 from painter.cycle.write_run import event_watch, write_log
 from painter.diagrams.hardware_station import RobotConnection
 from painter.errors import BusError, PainterError
+from painter.jobs.run_simulation import versions
 from painter.planning.program.remainder import Remainder
 from painter.run.folder.folder import RunFolder
 from painter.run.page.report import finish_run
