@@ -1,4 +1,4 @@
-"""Writes what a cycle left into its run folder, the robot's part and the truth."""
+"""Writes the log of a cycle into its run folder, with the truth where it is known."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ from painter.systems.values import CycleStatus, FollowerStatus, Phase
 from perception.ground import FloatArray
 from perception.values import WallSegmentation
 
-# How much nearer than planned the robot may come: tracking and the map's own error.
+# Allowance on planned clearances for tracking and for the map's error, m.
 CLEARANCE_TOLERANCE = 0.02
 
 
@@ -29,13 +29,13 @@ def write_log(
     *,
     before: FilmState | None = None,
 ) -> None:
-    """Writes what a cycle left, with the truth of its scene where that is known.
+    """Writes the log of a cycle, with the truth of its scene where that is known.
 
     Args:
         folder: The run's folder; its event log holds the cycle's events already.
         scenario: The job.
-        log: What it left.
-        before: Film that was there before it; None = none.
+        log: Of the cycle.
+        before: Film that was on the wall before; None = none.
     """
     write_collisions(
         folder, scenario, log.clearance_time, log.clearance, log.floor_clearance
@@ -70,11 +70,11 @@ def write_collisions(
     clearance: FloatArray,
     floor_clearance: FloatArray,
 ) -> None:
-    """Logs where the robot came nearer to something than was planned.
+    """Logs each episode in which the robot violated a clearance.
 
     Args:
         folder: The run's folder.
-        scenario: Gives what was planned.
+        scenario: Gives the planned clearances.
         time: (k,) s.
         clearance: (k,) m, from the scene.
         floor_clearance: (k,) m, from the floor and the robot's own frame.
@@ -96,14 +96,14 @@ def write_truth(
     *,
     before: FilmState | None = None,
 ) -> None:
-    """Writes the film, and what of the tile is truly wall.
+    """Writes the film, and which cells of the tile truly are paintable wall.
 
     Args:
         folder: The run's folder.
         scenario: Gives the scene.
-        segmentation: Says where the robot took its tile to be.
-        film: What is on the wall.
-        before: Film that was there before it; None = none.
+        segmentation: Gives the robot's estimate of its tile.
+        film: On the wall at the end.
+        before: Film that was on the wall before; None = none.
     """
     scene, X_WS = true_scene(scenario)
     X_ST = X_WS.inverse() @ segmentation.X_WT
@@ -131,13 +131,13 @@ def write_truth(
     columns, rows = cell_centres(surface.kind.shape, surface.cell)
     x0, y0 = float(surface.origin[0]), float(surface.origin[1])
     p_TQs = X_ST.inverse() @ grid_points(columns + x0, rows + y0)
-    asked = points_in_zones(p_TQs[:2].T, scenario.raster.zones)
+    in_zone = points_in_zones(p_TQs[:2].T, scenario.raster.zones)
     folder.save_film(
         Film.on_tile(
             thickness=film.thickness,
             kind=surface.kind,
-            # What the operator leaves out is to stay clean.
-            paintable=is_paintable(surface.kind) & asked.reshape(surface.kind.shape),
+            # An area that the operator excludes is keep-out.
+            paintable=is_paintable(surface.kind) & in_zone.reshape(surface.kind.shape),
             cell=surface.cell,
             x0=x0,
             y0=y0,
@@ -154,24 +154,30 @@ def write_truth(
 def event_watch(
     folder: RunFolder, show: Callable[[float, str], None]
 ) -> Callable[[float, CycleStatus, FollowerStatus], None]:
-    """Returns a watcher that logs each event once and moves the progress bar."""
+    """Returns a watch that logs each event once and moves the progress bar.
+
+    Args:
+        folder: The run's folder.
+        show: Takes the share of the cycle that is done, 0 to 1, and a text.
+    """
     logged = 0
     phases = list(Phase)
-    last = phases.index(Phase.DONE)
+    last, share = phases.index(Phase.DONE), 0.0
 
     def watch(now: float, status: CycleStatus, follower: FollowerStatus) -> None:
-        nonlocal logged
+        nonlocal logged, share
         for when, name, data in status.events[logged:]:
             folder.log(when, name, **data)
         logged = len(status.events)
         text = f"{status.phase.value.lower()}, robot time {now:.0f} s"
         # Painting takes most of the time of a cycle.
-        index = min(phases.index(status.phase), last)
-        share = 0.4 * index / last
+        index = phases.index(status.phase)
         if status.phase == Phase.PAINT and follower.duration > 0.0:
-            share += 0.5 * follower.position / follower.duration
-        elif index > phases.index(Phase.PAINT):
+            share = 0.4 * index / last + 0.5 * follower.position / follower.duration
+        elif status.phase in (Phase.RETRACT, Phase.DONE):
             share = 1.0
+        elif index < last:  # Else paused or stopped: the bar stays.
+            share = 0.4 * index / last
         show(share, text)
 
     return watch

@@ -26,7 +26,7 @@ TRAVEL = 0.020
 # When the second stroke has been sprayed for so long, the fault happens, s.
 INTO_STROKE = 0.4
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 
 class ProgramKilledError(Exception):

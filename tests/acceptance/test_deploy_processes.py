@@ -16,7 +16,7 @@ SCENE = ("blank", "--set", "tile={width: 0.7, height: 0.6, bottom: 0.9}")
 RATE = ("--rate", "0.2")
 PATIENCE = 200.0
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 
 class Bench:

@@ -12,7 +12,7 @@ from painter.robot.robot_model import MakeRobotModel
 NAMED = [(name, 1) for name in ("blank", "cubes", "obstacles", "room", "terrace")]
 RANDOM = [("random", seed) for seed in range(1, 21)]
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from painter.run.folder.folder import FILES, INCOMPLETE
 # The seed 1 of DESIGN's "random" with the five named scenes.
 SCENES = ["cubes", "obstacles", "terrace", "room", "blank", "random"]
 OPTIONAL = {"look.png"}
+pytestmark = pytest.mark.timeout(1800)
 
 
 @pytest.fixture(scope="session")

@@ -16,13 +16,14 @@ def code_cells(path: Path) -> list[nbformat.NotebookNode]:
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs_top_to_bottom(path, monkeypatch, tmp_path):
     monkeypatch.setenv("PAINTER_SHORT", "1")
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(
         notebook,
-        timeout=240,
+        timeout=1500,
         kernel_name="python3",
         resources={"metadata": {"path": str(tmp_path)}},
     ).execute()
