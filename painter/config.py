@@ -1,12 +1,11 @@
 """Scenarios: one file describes a run on either body.
 
 `load_scenario` reads a named scenario or a file, applies `key=value` overrides and
-checks every range. Drake's `yaml_load_typed` refuses unknown keys.
+checks every value; see `perception.settings`.
 """
 
 import dataclasses
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,43 +24,53 @@ from painter.planning.config import (
 )
 from painter.resources import models_path, named_scenarios
 from perception.config import MapConfig, SegmentationConfig, StereoConfig
-from perception.ground import check_positive
 from perception.mapping.config import PoseGraphConfig
+from perception.settings import Conflict, setting, validate
 
 
 @dataclasses.dataclass(kw_only=True)
 class PidGains:
-    """Joint position loop; per unit of inertia, so 1/s², 1/s³ and 1/s."""
+    """Joint position loop, per unit of inertia.
 
-    kp: float = 1600.0
-    ki: float = 0.0
-    kd: float = 80.0
+    Attributes:
+        kp: Gain on the position error.
+        ki: Gain on its integral.
+        kd: Gain on the velocity error.
+    """
+
+    kp: float = setting(1600.0, "1/s²", least=0.0, most=1e6)
+    ki: float = setting(0.0, "1/s³", least=0.0, most=1e8)
+    kd: float = setting(80.0, "1/s", least=0.0, most=1e4)
 
 
 @dataclasses.dataclass(kw_only=True)
 class DriveFault:
-    """A fault to inject in the simulated drives; `code` as in CiA 402, 603Fh."""
+    """A fault to inject in the simulated drives.
 
-    time: float = 0.0
-    joint: int = 1
-    code: int = 0x7500
+    Attributes:
+        time: When it happens.
+        joint: Joint of the drive, base yaw first.
+        code: Error code that the drive reports.
+    """
+
+    time: float = setting(0.0, "s", least=0.0, most=86_400.0)
+    joint: int = setting(1, "1", least=1, most=5)
+    code: int = setting(0x7500, "1", least=0, most=0xFFFF, source="CiA 402, 603Fh")
 
 
 @dataclasses.dataclass(kw_only=True)
 class ArmConfig:
-    """One arm; the simulator reads `gains`, `encoder_bits` and `faults`.
+    """The arm; simulation only.
 
     Attributes:
-        model_name: Name of the model instance in the plant.
         gains: Joint position loop of the simulated drives.
-        encoder_bits: Resolution of the joint-side encoders, bits a turn.
-        faults: Drive faults to inject; simulation only.
+        encoder_bits: Resolution of the joint-side encoders, bits per turn.
+        faults: Drive faults to inject.
     """
 
-    model_name: str = "arm"
-    gains: PidGains = dataclasses.field(default_factory=PidGains)
-    encoder_bits: int = 19
-    faults: list[DriveFault] = dataclasses.field(default_factory=list)
+    gains: PidGains = setting(PidGains())
+    encoder_bits: int = setting(19, "1", least=8, most=32)
+    faults: list[DriveFault] = setting([])
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -69,34 +78,38 @@ class WallCameraConfig:
     """The depth camera on the tool.
 
     Attributes:
-        rate: Depth pictures a second.
-        color_width: Width of colour pictures, px.
-        color_height: Height of colour pictures, px.
-        stereo: Geometry and errors of the depth sensor.
-        mount_error_m: Offset of the real mount from the modelled one along C's x, y
-            and z; simulation only.
-        mount_error_deg: Its rotation, roll, pitch and yaw about the same axes.
-        calibrated_m: What `painter calibrate` found of that offset, on either body.
-        calibrated_deg: Of its rotation.
-        driver: How librealsense drives the real camera; not read in simulation.
+        rate: Depth images per second.
+        color_width: Width of colour images.
+        color_height: Height of colour images.
+        mount_error_m: Offset of the real mount from the modelled one along C's x, y and
+            z; simulation only.
+        mount_error_deg: Its rotation: roll, pitch and yaw about the same axes;
+            simulation only.
+        calibrated_m: Offset of the mount as `painter calibrate` found it, on either
+            body.
+        calibrated_deg: Rotation of the mount as `painter calibrate` found it.
     """
 
-    rate: float = 5.0
-    color_width: int = 848
-    color_height: int = 480
-    stereo: StereoConfig = dataclasses.field(default_factory=StereoConfig)
-    mount_error_m: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
-    mount_error_deg: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
-    calibrated_m: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
-    calibrated_deg: list[float] = dataclasses.field(default_factory=lambda: [0.0] * 3)
-    driver: CameraDriverConfig = dataclasses.field(default_factory=CameraDriverConfig)
+    rate: float = setting(5.0, "Hz", above=0.0, most=90.0)
+    color_width: int = setting(848, "px", least=16, most=4096)
+    color_height: int = setting(480, "px", least=16, most=4096)
+    stereo: StereoConfig = setting(StereoConfig())
+    mount_error_m: list[float] = setting([0.0] * 3, "m", least=-0.5, most=0.5, length=3)
+    mount_error_deg: list[float] = setting(
+        [0.0] * 3, "deg", least=-180.0, most=180.0, length=3
+    )
+    calibrated_m: list[float] = setting([0.0] * 3, "m", least=-0.5, most=0.5, length=3)
+    calibrated_deg: list[float] = setting(
+        [0.0] * 3, "deg", least=-180.0, most=180.0, length=3
+    )
+    driver: CameraDriverConfig = setting(CameraDriverConfig())
 
 
 @dataclasses.dataclass(kw_only=True)
 class GunConfig:
-    """The spray gun; `tip` is what is screwed on."""
+    """The spray gun."""
 
-    tip: TipConfig = dataclasses.field(default_factory=TipConfig)
+    tip: TipConfig = setting(TipConfig())
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -105,13 +118,13 @@ class CycleConfig:
 
     Attributes:
         unattended: True skips the operator's approval in REVIEW.
-        period: Time between the brain's decisions, s.
-        time_limit: Robot time after which a cycle that has not ended is a fault, s.
+        period: Time between two decisions of the brain.
+        time_limit: A cycle that has not ended after this robot time is a fault.
     """
 
-    unattended: bool = True
-    period: float = 0.02
-    time_limit: float = 600.0
+    unattended: bool = setting(True)
+    period: float = setting(0.02, "s", above=0.0, most=1.0)
+    time_limit: float = setting(600.0, "s", above=0.0, most=604_800.0)
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -124,85 +137,42 @@ class Scenario:
             "random" for one drawn from `random_seed`; simulation only.
         random_seed: Seed of every random draw.
         directives: Model directives of the robot's cell, package:// or a path.
-        plant_config: Drake's plant settings; simulation only.
+        plant_config: Drake's plant settings, `MultibodyPlantConfig`; simulation only.
     """
 
-    name: str = "default"
-    scene: str = "cubes"
-    random_seed: int = 1
-    directives: str = "package://painter_models/painter_cell.dmd.yaml"
-    plant_config: MultibodyPlantConfig = dataclasses.field(
-        default_factory=lambda: MultibodyPlantConfig(time_step=0.001)
-    )
-    arm: ArmConfig = dataclasses.field(default_factory=ArmConfig)
-    wall_camera: WallCameraConfig = dataclasses.field(default_factory=WallCameraConfig)
-    gun: GunConfig = dataclasses.field(default_factory=GunConfig)
-    tile: TileConfig = dataclasses.field(default_factory=TileConfig)
-    scan: ScanConfig = dataclasses.field(default_factory=ScanConfig)
-    map: MapConfig = dataclasses.field(default_factory=MapConfig)
-    pose_graph: PoseGraphConfig = dataclasses.field(default_factory=PoseGraphConfig)
-    segmentation: SegmentationConfig = dataclasses.field(
-        default_factory=SegmentationConfig
-    )
-    raster: RasterConfig = dataclasses.field(default_factory=RasterConfig)
-    motion: MotionConfig = dataclasses.field(default_factory=MotionConfig)
-    cycle: CycleConfig = dataclasses.field(default_factory=CycleConfig)
+    name: str = setting("default")
+    scene: str = setting("cubes")
+    random_seed: int = setting(1, "1", least=0, most=2**32 - 1)
+    directives: str = setting("package://painter_models/painter_cell.dmd.yaml")
+    plant_config: MultibodyPlantConfig = setting(MultibodyPlantConfig(time_step=0.001))
+    arm: ArmConfig = setting(ArmConfig())
+    wall_camera: WallCameraConfig = setting(WallCameraConfig())
+    gun: GunConfig = setting(GunConfig())
+    tile: TileConfig = setting(TileConfig())
+    scan: ScanConfig = setting(ScanConfig())
+    map: MapConfig = setting(MapConfig())
+    pose_graph: PoseGraphConfig = setting(PoseGraphConfig())
+    segmentation: SegmentationConfig = setting(SegmentationConfig())
+    raster: RasterConfig = setting(RasterConfig())
+    motion: MotionConfig = setting(MotionConfig())
+    cycle: CycleConfig = setting(CycleConfig())
 
-    def validate(self) -> None:
-        """Raises ValueError for the first value out of bounds."""
-        check_positive("plant_config", time_step=self.plant_config.time_step)
-        check_positive("wall_camera", rate=self.wall_camera.rate)
-        for name, gain in dataclasses.asdict(self.arm.gains).items():
-            if not 0.0 <= gain < math.inf:
-                raise ValueError(f"arm.gains.{name} must be >= 0, got {gain!r}.")
-        check_positive("cycle", period=self.cycle.period)
-        check_positive("cycle", time_limit=self.cycle.time_limit)
-        if not 8 <= self.arm.encoder_bits <= 32:
-            raise ValueError(
-                f"arm.encoder_bits must be 8 to 32, got {self.arm.encoder_bits!r}."
-            )
-        for fault in self.arm.faults:
-            if not 1 <= fault.joint <= 5:
-                raise ValueError(
-                    f"arm.faults: joint must be 1 to 5, got {fault.joint!r}."
-                )
-        for name in (
-            "mount_error_m",
-            "mount_error_deg",
-            "calibrated_m",
-            "calibrated_deg",
-        ):
-            if len(getattr(self.wall_camera, name)) != 3:
-                raise ValueError(f"wall_camera.{name} must have 3 numbers.")
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yields values that do not fit together, across parts."""
+        time_step = self.plant_config.time_step
+        if not 0.0 < time_step <= 0.01:
+            yield "plant_config.time_step", "> 0 and <= 0.01 s", time_step
         fastest = self.motion.limit_share * self.motion.nozzle_speed
         if self.raster.speed > fastest:
-            raise ValueError(
-                f"raster.speed must be <= {fastest:g} m/s, motion.limit_share of "
-                f"motion.nozzle_speed, got {self.raster.speed!r}."
-            )
+            bound = f"<= {fastest:g} m/s, motion.limit_share of motion.nozzle_speed"
+            yield "raster.speed", bound, self.raster.speed
         drying = (self.raster.coats - 1) * self.raster.flash_off
         if drying >= self.cycle.time_limit:
-            raise ValueError(
-                f"cycle.time_limit must be > {drying:g} s, raster.flash_off of all "
-                f"coats but the last, got {self.cycle.time_limit!r}."
-            )
-        for number, zone in enumerate(self.raster.zones):
-            name = f"raster.zones[{number}]"
-            zone.validate(name)
-            zone.require_on(self.tile.width, self.tile.height, name)
-        for part in (
-            self.wall_camera.stereo,
-            self.wall_camera.driver,
-            self.gun.tip,
-            self.tile,
-            self.scan,
-            self.map,
-            self.pose_graph,
-            self.segmentation,
-            self.raster,
-            self.motion,
-        ):
-            part.validate()
+            bound = f"> {drying:g} s, raster.flash_off of all coats but the last"
+            yield "cycle.time_limit", bound, self.cycle.time_limit
+        for i, zone in enumerate(self.raster.zones):
+            for field, bound, x in zone.beyond(self.tile.width, self.tile.height):
+                yield f"raster.zones[{i}].{field}", bound, x
 
 
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
@@ -259,7 +229,7 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         scenario: Scenario = yaml_load_typed(
             schema=Scenario, data=yaml.safe_dump(fields), defaults=Scenario()
         )
-        scenario.validate()
+        validate(scenario)
     except (RuntimeError, ValueError, TypeError, KeyError, AssertionError) as error:
         raise InputError(
             f"{path}: {_one_line(error)}", code="PNT-SCENARIO-006"

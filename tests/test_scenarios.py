@@ -9,6 +9,7 @@ import yaml
 from painter.config import Scenario, dump_scenario, load_scenario
 from painter.errors import InputError
 from painter.resources import models_path, named_scenarios
+from perception.settings import describe
 
 # DESIGN section 7.
 NAMES = {"blank", "cubes", "obstacles", "random", "room", "terrace"}
@@ -89,6 +90,13 @@ def test_a_later_override_wins():
         ("arm.encoder_bits=99", "arm.encoder_bits"),
         ("arm.faults=[{joint: 6}]", "arm.faults"),
         ("wall_camera.mount_error_m=[1]", "mount_error_m"),
+        ("wall_camera.rate=91", "wall_camera.rate must be > 0 and <= 90 Hz, got 91"),
+        ("wall_camera.stereo.fattening=4", "stereo.fattening must be odd and 1 to 51"),
+        ("wall_camera.driver.fps=0", "wall_camera.driver.fps must be 1 to 90 Hz"),
+        ("map={min_range: 3.0}", "map.min_range must be < max_range, 3.0 m, got 3.0"),
+        ("motion.home_deg=[0, 0, 0, 0, 181]", "motion.home_deg[4] must be -180 to 180"),
+        ("plant_config.time_step=0", "plant_config.time_step must be > 0"),
+        ("gun.tip.transfer_efficiency=1.1", "gun.tip.transfer_efficiency must be > 0"),
     ],
 )
 def test_a_bad_override_is_one_line_that_names_it(override, named):
@@ -149,3 +157,68 @@ def test_no_number_may_be_nan(key):
 def test_a_scene_file_has_one_top_key_named_as_the_file(path):
     document = yaml.safe_load(path.read_text())
     assert list(document) == [path.name.removesuffix(".scene.yaml")]
+
+
+LEAVES = [
+    item for item in describe(Scenario) if not dataclasses.is_dataclass(item.kind)
+]
+# Models of devices and the paper's method: their numbers come from somewhere.
+SOURCED = (
+    *("wall_camera.stereo.", "wall_camera.driver.threshold_", "gun.tip.fan"),
+    *("wall_camera.driver.spatial_", "wall_camera.driver.temporal_", "gun.tip.flow"),
+    *("gun.tip.transfer_efficiency", "segmentation.neighbors", "segmentation.cell"),
+    *("segmentation.std_multiplier", "segmentation.distance_threshold"),
+    *("segmentation.stop_fraction", "segmentation.max_planes"),
+    *("segmentation.cluster_tolerance", "segmentation.min_region_area"),
+)
+
+
+def is_number(item):
+    return item.kind in (int, float) or item.kind == list[float]
+
+
+@pytest.mark.parametrize("item", describe(Scenario), ids=lambda item: item.path)
+def test_every_setting_is_described_with_unit_and_bounds(item):
+    assert item.text.endswith(".")
+    # The unit stands in the metadata alone.
+    assert not item.text.endswith((", m.", ", s.", ", px.", ", m/s.", ", deg."))
+    if is_number(item):
+        assert item.rule.unit
+        assert max(item.rule.least, item.rule.above) > -math.inf
+        assert min(item.rule.most, item.rule.below) < math.inf
+    else:
+        assert item.rule.unit in ("", "m")  # Zones have corners.
+    if item.path.startswith(SOURCED):
+        assert item.rule.source
+
+
+def test_all_settings_are_described():
+    """Every leaf of the dumped defaults is there, and nothing else."""
+
+    def leaves(value, path=""):
+        if not isinstance(value, dict):
+            return {path}
+        return {
+            leaf
+            for name, item in value.items()
+            for leaf in leaves(item, f"{path}.{name}" if path else name)
+        }
+
+    ((_, fields),) = yaml.safe_load(dump_scenario(Scenario())).items()
+    del fields["plant_config"]  # Drake's own.
+    described = {item.path for item in LEAVES if "[]" not in item.path}
+    assert described - {"plant_config"} == leaves(fields)
+
+
+@pytest.mark.parametrize(
+    "item",
+    [item for item in LEAVES if item.kind in (int, float) and "[]" not in item.path],
+    ids=lambda item: item.path,
+)
+def test_a_number_just_outside_its_bounds_is_refused_by_name(item):
+    rule, step = item.rule, 1 if item.kind is int else 1e-6
+    low = rule.above if math.isfinite(rule.above) else rule.least - step
+    high = rule.below if math.isfinite(rule.below) else rule.most + step
+    for value in (low, high):
+        with pytest.raises(InputError, match=f"{item.path} must be .* got {value!r}"):
+            load_scenario("blank", [f"{item.path}={value!r}"])

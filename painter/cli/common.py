@@ -12,6 +12,7 @@ import typer
 
 from painter.errors import InputError
 from painter.resources import named_scenarios
+from perception.settings import problems
 
 if TYPE_CHECKING:
     from painter.planning.config import ZoneConfig
@@ -196,11 +197,12 @@ def parse_zones(
         for argument in arguments or ():
             name = f"--{kind} {argument!r}"
             zone = ZoneConfig(kind=kind, corners=parse_corners(f"--{kind}", argument))
-            try:
-                zone.validate(name)
-                zone.require_on(width, height, name)
-            except ValueError as error:
-                raise InputError(str(error), code="PNT-USE-009") from error
+            wrong = list(problems(zone, name)) or [
+                f"{name}.{field} must be {bound}, got {value!r}."
+                for field, bound, value in zone.beyond(width, height)
+            ]
+            if wrong:
+                raise InputError(wrong[0], code="PNT-USE-009")
             zones.append(zone)
     return zones
 

@@ -15,6 +15,7 @@ from painter.cli.common import (
     progress,
 )
 from painter.errors import InputError
+from perception.settings import validate
 
 if TYPE_CHECKING:
     from perception.mapping.config import MapperConfig
@@ -140,7 +141,7 @@ def _mapper_config(overrides: list[str] | None) -> "MapperConfig":
             ) from None
     config = MapperConfig(**values)
     try:
-        config.validate()
+        validate(config, "mapping")
     except ValueError as error:
         raise InputError(f"--set: {error}", code="PNT-USE-030") from error
     return config

@@ -1,83 +1,62 @@
-"""Settings of planning: tile, tip, raster, scan and motion; SI units.
+"""Settings of planning: tile, tip, raster, scan and motion; see `perception.settings`.
 
-Plain mutable dataclasses, because Drake's `yaml_load_typed` fills them field by field.
+Plain mutable dataclasses, so that Drake's `yaml_load_typed` can fill them.
 """
 
 import dataclasses
-import math
+from collections.abc import Iterator
 
-from perception.ground import check_positive
+from perception.settings import Conflict, setting
 
-MOST_COATS = 4
+_TIP_GUIDE = "Graco tip guide: first digit x 5 cm at 30 cm"
+_ORIFICE = "orifice equation for a 0.015 inch tip, water at 138 bar"
+_ASSUMED = "assumption for flat walls, see models/gun/README.md"
 
 
 @dataclasses.dataclass(kw_only=True)
 class TileConfig:
-    """The piece of wall painted from one base placement, as the job expects it.
+    """The rectangle of wall painted from one base position, as the job expects it.
 
     The arm base stands upright on the floor at W's origin, W x towards the wall.
 
     Attributes:
-        width: Width, m; the tile is centred on the arm's base axis.
-        height: Height, m.
-        bottom: Height of its lower edge over the floor (W z = 0), m.
-        distance: Distance of the wall from the arm's base axis, m.
+        width: Width; the tile is centred on the arm's base axis.
+        height: Height.
+        bottom: Height of its lower edge above the floor, W z = 0.
+        distance: Distance of the wall from the arm's base axis.
     """
 
-    width: float = 2.0
-    height: float = 2.0
-    bottom: float = 0.2
-    distance: float = 1.05
-
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
-        check_positive(
-            "tile", width=self.width, height=self.height, distance=self.distance
-        )
-        if not 0.0 <= self.bottom < math.inf:
-            raise ValueError(f"tile.bottom must be >= 0 m, got {self.bottom!r}.")
+    width: float = setting(2.0, "m", least=0.1, most=5.0)
+    height: float = setting(2.0, "m", least=0.1, most=5.0)
+    bottom: float = setting(0.2, "m", least=0.0, most=5.0)
+    distance: float = setting(1.05, "m", least=0.3, most=5.0)
 
 
 @dataclasses.dataclass(kw_only=True)
 class TipConfig:
     """Spray tip: an elliptical double-beta fan.
 
-    Source: fan width and orifice: Graco tip guide (first digit x 5 cm at 30 cm); flow:
-    orifice equation for a 0.015 inch tip; `transfer_efficiency`, `fan_thickness`:
-    assumptions for flat walls, see docs of the gun model.
-
     Attributes:
-        fan_width: Length of the fan's long axis at `fan_distance`, m.
-        fan_thickness: Length of its short axis at `fan_distance`, m.
-        fan_distance: Stand-off at which the fan has these sizes, m.
+        fan_width: Length of the fan's long axis at `fan_distance`.
+        fan_thickness: Length of its short axis at `fan_distance`.
+        fan_distance: Stand-off at which the fan has these sizes.
         gamma: Exponent of a stroke's cross profile (1 - x²/a²)^gamma; beta1 - 1/2.
         beta2: Exponent of the profile along the short axis.
-        flow: Volume flow at trigger 1, m³/s.
+        flow: Volume flow at trigger 1.
         transfer_efficiency: Share of the flow that lands on the wall.
-        valve_delay: Time from trigger to flow, opening and closing, s.
+        valve_delay: Time from trigger to flow, opening and closing.
     """
 
-    fan_width: float = 0.25
-    fan_thickness: float = 0.05
-    fan_distance: float = 0.30
-    gamma: float = 2.0
-    beta2: float = 2.0
-    flow: float = 1.517e-5
-    transfer_efficiency: float = 0.65
-    valve_delay: float = 0.02
-
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
-        values = dataclasses.asdict(self)
-        delay = values.pop("valve_delay")
-        check_positive("gun.tip", **values)
-        if self.transfer_efficiency > 1.0:
-            raise ValueError(
-                "gun.tip.transfer_efficiency must be <= 1, got "
-                f"{self.transfer_efficiency!r}."
-            )
-        if not 0.0 <= delay < 0.5:
-            raise ValueError(f"gun.tip.valve_delay must be 0 to 0.5 s, got {delay!r}.")
+    fan_width: float = setting(0.25, "m", least=0.02, most=1.0, source=_TIP_GUIDE)
+    fan_thickness: float = setting(0.05, "m", least=0.005, most=1.0, source=_ASSUMED)
+    fan_distance: float = setting(0.30, "m", least=0.05, most=1.0, source=_TIP_GUIDE)
+    gamma: float = setting(2.0, "1", above=0.0, most=20.0, source=_ASSUMED)
+    beta2: float = setting(2.0, "1", above=0.0, most=20.0, source=_ASSUMED)
+    flow: float = setting(1.517e-5, "m³/s", above=0.0, most=1e-3, source=_ORIFICE)
+    transfer_efficiency: float = setting(
+        0.65, "1", above=0.0, most=1.0, source=_ASSUMED
+    )
+    valve_delay: float = setting(0.02, "s", least=0.0, below=0.5)
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -85,163 +64,104 @@ class ZoneConfig:
     """A piece of the tile that the operator marks.
 
     Attributes:
-        kind: "exclude": stays clean; "include": nothing outside such zones is painted.
-        corners: x, y of its corners in T, m: at least three, or two opposite ones of a
+        kind: "exclude" keeps paint off the zone; with "include", nothing outside such
+            zones is painted.
+        corners: x, y of its corners in T: three or more, or two opposite ones of a
             rectangle.
     """
 
-    kind: str = "exclude"
-    corners: list[list[float]] = dataclasses.field(default_factory=list)
+    kind: str = setting("exclude", choices=("exclude", "include"))
+    corners: list[list[float]] = setting([], "m")
 
-    def validate(self, name: str) -> None:
-        """Raises ValueError for a value out of bounds; `name` is the zone's."""
-        if self.kind not in ("exclude", "include"):
-            raise ValueError(
-                f'{name}.kind must be "exclude" or "include", got {self.kind!r}.'
-            )
-        if len(self.corners) < 2 or not all(
-            len(corner) == 2 and all(math.isfinite(value) for value in corner)
-            for corner in self.corners
-        ):
-            raise ValueError(
-                f"{name}.corners must be two or more pairs x, y, got {self.corners!r}."
-            )
-        x, y = zip(*self.corners, strict=True)
-        if max(x) - min(x) <= 0.0 or max(y) - min(y) <= 0.0:
-            raise ValueError(
-                f"{name}.corners must enclose more than 0 m², got {self.corners!r}."
-            )
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yields corners that make no zone."""
+        if len(self.corners) < 2 or any(len(corner) != 2 for corner in self.corners):
+            yield "corners", "two or more pairs x, y", self.corners
+        elif any(max(axis) == min(axis) for axis in zip(*self.corners, strict=True)):
+            yield "corners: area", "> 0 m²", self.corners
 
-    def require_on(self, width: float, height: float, name: str) -> None:
-        """Raises ValueError for a corner that is not on a tile or wall, m."""
+    def beyond(self, width: float, height: float) -> Iterator[Conflict]:
+        """Yields coordinates that are not on a tile or wall of this size, m."""
         for x, y in self.corners:
-            for axis, value, bound in (("x", x, width), ("y", y, height)):
-                if not 0.0 <= value <= bound:
-                    raise ValueError(
-                        f"{name}.corners: {axis} must be 0 to {bound:g} m, got "
-                        f"{value!r}."
-                    )
+            for axis, value, most in (("x", x, width), ("y", y, height)):
+                if not 0.0 <= value <= most:
+                    yield f"corners: {axis}", f"0 to {most:g} m", value
 
 
 @dataclasses.dataclass(kw_only=True)
 class RasterConfig:
     """Strokes of a tile.
 
+    Strokes are vertical: the fan's long axis is horizontal, fixed by how the gun is
+    bolted on, and an arm of five joints cannot roll it.
+
     Attributes:
-        speed: Gun speed on a stroke, m/s.
-        standoff: Distance from nozzle to wall along the spray axis, m. From 0.315 m a
-            fan of 25 cm at 0.30 m fills 2 m in 14 strokes at its best pitch, not 15.
-        overlap_pitch: Distance between strokes, m; 0 = the pitch of least variance for
-            the tip, 2 pi a / j(gamma + 1/2, 1), spread to fill the tile's width.
-        lead: Gun stays on this far beyond the edge of what is to be painted, m.
-        keepout_margin: Grown around what must stay clean, m.
-        min_stroke: Shorter strokes are dropped, m.
-        wall_share: Without cut-in, the gun is on where at least this share of the
-            fan's flow lands on wall that is to be painted.
-        cut_in: Fit the strokes to the film that they leave, with strokes nearer to the
-            wall beside edges; False = the raster alone.
-        cut_in_standoff: Nearest stand-off of such strokes, m; the fan is narrower by
-            as much. None are made where it is not below `standoff`.
-        coats: Coats that the film is laid in, each with the same share of it; more
-            than one are cut in.
-        flash_off: Rest between two coats, for which the first dries, s; what a paint
-            wants stands in its data sheet.
-        direction: Of the strokes; "vertical" alone can be.
-        zones: What the operator wants painted or left.
+        speed: Gun speed on a stroke.
+        standoff: Stand-off of body strokes. From 0.315 m a fan of 25 cm at 0.30 m fills
+            2 m in 14 strokes at its best pitch, not 15.
+        overlap_pitch: Pitch of the raster; 0 = the pitch of least variance for the tip,
+            2 pi a / j(gamma + 1/2, 1), spread to fill the tile's width.
+        lead: The gun stays on this far beyond the edge of the paintable wall.
+        keepout_margin: Grown around keep-out.
+        min_stroke: Shorter strokes are dropped.
+        wall_share: Without cut-in, the gun is on where at least this share of the fan's
+            flow lands on paintable wall.
+        cut_in: Fits the strokes to the film that they leave, with cut-ins beside edges;
+            False = the raster alone.
+        cut_in_standoff: Smallest stand-off of cut-ins, where the fan is narrower. There
+            are none where it is not below `standoff`.
+        coats: Coats that the film is applied in, each with the same share of it: few,
+            so that the valve can dose them. Two or more need `cut_in`.
+        flash_off: Flash-off time between two coats; see the paint's data sheet.
+        zones: What the operator includes or excludes.
     """
 
-    speed: float = 0.6
-    standoff: float = 0.315
-    overlap_pitch: float = 0.0
-    lead: float = 0.005
-    keepout_margin: float = 0.0
-    min_stroke: float = 0.03
-    wall_share: float = 0.5
-    cut_in: bool = True
-    cut_in_standoff: float = 0.06
-    coats: int = 1
-    flash_off: float = 60.0
-    direction: str = "vertical"
-    zones: list[ZoneConfig] = dataclasses.field(default_factory=list)
+    speed: float = setting(0.6, "m/s", above=0.0, most=5.0)
+    standoff: float = setting(0.315, "m", least=0.05, most=1.0)
+    overlap_pitch: float = setting(0.0, "m", least=0.0, below=1.0)
+    lead: float = setting(0.005, "m", least=0.0, below=1.0)
+    keepout_margin: float = setting(0.0, "m", least=0.0, below=1.0)
+    min_stroke: float = setting(0.03, "m", least=0.0, below=1.0)
+    wall_share: float = setting(0.5, "1", above=0.0, below=1.0)
+    cut_in: bool = setting(True)
+    cut_in_standoff: float = setting(0.06, "m", least=0.05, below=1.0)
+    coats: int = setting(1, "1", least=1, most=4)
+    flash_off: float = setting(60.0, "s", least=0.0, most=86_400.0)
+    zones: list[ZoneConfig] = setting([])
 
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
-        check_positive("raster", speed=self.speed, standoff=self.standoff)
-        if self.direction != "vertical":
-            raise ValueError(
-                'raster.direction must be "vertical": the fan\'s long axis is '
-                "horizontal, fixed by how the gun is bolted on, and an arm of five "
-                f"joints cannot roll it; got {self.direction!r}."
-            )
-        for number, zone in enumerate(self.zones):
-            zone.validate(f"raster.zones[{number}]")
-        if not 1 <= self.coats <= MOST_COATS:
-            raise ValueError(
-                f"raster.coats must be 1 to {MOST_COATS}, so that the valve can dose "
-                f"them, got {self.coats!r}."
-            )
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yields values that do not fit together."""
         if self.coats > 1 and not self.cut_in:
-            raise ValueError(
-                f"raster.coats must be 1 without raster.cut_in, got {self.coats!r}."
-            )
-        if not 0.0 <= self.flash_off < math.inf:
-            raise ValueError(
-                f"raster.flash_off must be >= 0 s, got {self.flash_off!r}."
-            )
-        if not 0.05 <= self.cut_in_standoff < 1.0:
-            raise ValueError(
-                "raster.cut_in_standoff must be 0.05 to 1 m, got "
-                f"{self.cut_in_standoff!r}."
-            )
-        for name in ("overlap_pitch", "lead", "keepout_margin", "min_stroke"):
-            if not 0.0 <= getattr(self, name) < 1.0:
-                raise ValueError(
-                    f"raster.{name} must be 0 to 1 m, got {getattr(self, name)!r}."
-                )
-        if not 0.0 < self.wall_share < 1.0:
-            raise ValueError(
-                f"raster.wall_share must be between 0 and 1, got {self.wall_share!r}."
-            )
+            yield "coats", "1 without cut_in", self.coats
 
 
 @dataclasses.dataclass(kw_only=True)
 class ScanConfig:
-    """First sight of the wall and the zig-zag scan.
+    """First look at the wall, the zig-zag scan and the looks after it.
 
     Attributes:
-        look_distance: Camera to expected wall at first sight, m; the arm has less far
-            to fold, and to turn from side to side, than for a look from farther off.
-        look_time: How long the arm holds still for first sight, s.
-        distance: Camera to wall during the scan, m; up to a fifth less where the arm
+        look_distance: Camera to expected wall at the first look; from here the arm has
+            less far to fold, and to turn from side to side, than from farther off.
+        look_time: How long the arm holds still for the first look.
+        distance: Camera to wall during the scan; up to a fifth less where the arm
             cannot fold back so far.
-        speed: Camera speed on the rows, m/s.
-        overlap: Share of a picture's height that neighbouring rows share.
-        margin: How far beyond the tile's edge the pictures reach, m.
-        more_looks: After the scan, at most so many looks into the shadows that it has
-            left.
-        more_look_time: How long the arm holds still for each of them, s: two pictures,
-            those before and after not counted.
+        speed: Camera speed on the rows.
+        overlap: Share of an image's height that neighbouring rows share.
+        margin: How far beyond the tile's edge the images reach.
+        more_looks: Most looks after the scan, into the shadows that it left. Every
+            order is tried to find the shortest path.
+        more_look_time: How long the arm holds still for each of them: two images,
+            without those before and after.
     """
 
-    look_distance: float = 0.6
-    look_time: float = 0.6
-    distance: float = 0.70
-    speed: float = 0.25
-    overlap: float = 0.3
-    margin: float = 0.05
-    more_looks: int = 4
-    more_look_time: float = 0.4
-
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
-        values = dataclasses.asdict(self)
-        looks = values.pop("more_looks")
-        check_positive("scan", **values)
-        # They are tried in every order to find the shortest.
-        if not 0 <= looks <= 6:
-            raise ValueError(f"scan.more_looks must be 0 to 6, got {looks!r}.")
-        if self.overlap >= 0.9:
-            raise ValueError(f"scan.overlap must be < 0.9, got {self.overlap!r}.")
+    look_distance: float = setting(0.6, "m", least=0.05, most=5.0)
+    look_time: float = setting(0.6, "s", above=0.0, most=60.0)
+    distance: float = setting(0.70, "m", least=0.05, most=5.0)
+    speed: float = setting(0.25, "m/s", above=0.0, most=2.0)
+    overlap: float = setting(0.3, "1", above=0.0, below=0.9)
+    margin: float = setting(0.05, "m", above=0.0, most=1.0)
+    more_looks: int = setting(4, "1", least=0, most=6)
+    more_look_time: float = setting(0.4, "s", above=0.0, most=60.0)
 
 
 @dataclasses.dataclass(kw_only=True)
@@ -250,46 +170,33 @@ class MotionConfig:
 
     Attributes:
         limit_share: Share of the joints' velocity and acceleration limits that plans
-            may use, so that tracking has something in hand.
-        nozzle_speed: Most speed of the gun's nozzle, m/s; plans use `limit_share` of
-            it, too. The joints alone let it have 2.2 m/s in transits of the named
-            scenes.
-        clearance: Least distance of the arm and gun from wall and obstacles, m.
-        floor_clearance: Least distance from the floor and the arm's own frame, m; they
+            use, so that tracking has a reserve.
+        nozzle_speed: Speed limit of the gun's nozzle; plans use `limit_share` of it.
+            Joint limits alone would allow 2.2 m/s in transitions of the named scenes.
+        clearance: Least clearance of arm and gun from wall and obstacles.
+        floor_clearance: Least clearance from the floor and the arm's own frame. Both
             are known better than what was mapped, and the gun turns close to the floor.
-        sample_period: Spacing of a planned motion's samples, s.
-        wall_keepout: The arm stays this far and the clearance from the wall until the
-            wall has been scanned, m; what hangs on it is not known before. On the lower
+        sample_period: Time between samples of a planned motion.
+        wall_keepout: Until the wall has been scanned, the arm stays this far and the
+            clearance from it, since what hangs on it is not known yet. On the lower
             rows of a scan the bent elbow leaves no more than 0.10 m.
-        home_deg: Joint angles, base yaw first, of the folded pose where every program
-            ends and over which detours go: gun ahead, half a metre off the wall.
+        home_deg: HOME: joint angles, base yaw first, of the folded pose where every
+            program ends and over which detours go; gun ahead, half a metre off the
+            wall.
     """
 
-    limit_share: float = 0.9
-    nozzle_speed: float = 2.5
-    clearance: float = 0.04
-    floor_clearance: float = 0.01
-    sample_period: float = 0.01
-    wall_keepout: float = 0.10
-    home_deg: list[float] = dataclasses.field(
-        default_factory=lambda: [0.0, -111.0, 155.0, -44.0, 0.0]
+    limit_share: float = setting(0.9, "1", above=0.0, most=1.0)
+    nozzle_speed: float = setting(2.5, "m/s", above=0.0, most=5.0)
+    clearance: float = setting(0.04, "m", above=0.0, most=0.5)
+    floor_clearance: float = setting(0.01, "m", above=0.0, most=0.5)
+    sample_period: float = setting(0.01, "s", least=0.001, most=0.1)
+    wall_keepout: float = setting(0.10, "m", above=0.0, most=1.0)
+    home_deg: list[float] = setting(
+        [0.0, -111.0, 155.0, -44.0, 0.0], "deg", least=-180.0, most=180.0, length=5
     )
 
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
-        values = dataclasses.asdict(self)
-        home = values.pop("home_deg")
-        check_positive("motion", **values)
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yields values that do not fit together."""
         if self.floor_clearance > self.clearance:
-            raise ValueError(
-                f"motion.floor_clearance must be <= motion.clearance "
-                f"({self.clearance!r} m), got {self.floor_clearance!r}."
-            )
-        if len(home) != 5 or not all(abs(angle) <= 180.0 for angle in home):
-            raise ValueError(
-                f"motion.home_deg must have 5 angles of -180 to 180, got {home!r}."
-            )
-        if self.limit_share > 1.0:
-            raise ValueError(
-                f"motion.limit_share must be <= 1, got {self.limit_share!r}."
-            )
+            bound = f"<= clearance, {self.clearance!r} m"
+            yield "floor_clearance", bound, self.floor_clearance

@@ -22,6 +22,7 @@ from perception.config import StereoConfig
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.depth_camera.windows import moving_max, moving_min
 from perception.ground import BoolArray
+from perception.settings import validate
 
 FloatImage = npt.NDArray[np.float32]
 DepthImage = npt.NDArray[np.uint16]
@@ -55,7 +56,7 @@ class StereoModel:
         Raises:
             ValueError: A setting is out of bounds.
         """
-        config.validate()
+        validate(config, "wall_camera.stereo")
         self._config = dataclasses.replace(config)
         intrinsics = CameraIntrinsics.from_stereo(config)
         self._focal = intrinsics.fx

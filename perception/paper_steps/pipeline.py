@@ -19,6 +19,7 @@ from perception.paper_steps.regions import (
     sort_by_area,
 )
 from perception.paper_steps.wall import finite_points
+from perception.settings import validate
 from perception.values import TileSize, Wall, WallSegmentation
 
 
@@ -85,7 +86,7 @@ def find_planes(
     Raises:
         NoWallError: There are too few points.
     """
-    config.validate()
+    validate(config, "segmentation")
     p_WQs = p_WQs.compress(finite_points(p_WQs), axis=1)
     kept = statistical_filter(
         p_WQs,

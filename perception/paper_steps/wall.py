@@ -10,6 +10,7 @@ from perception.config import SegmentationConfig
 from perception.errors import AmbiguousWallError, NoWallError, ObliqueWallError
 from perception.ground import BoolArray, FloatArray
 from perception.paper_steps.planes import Plane, segment_planes
+from perception.settings import validate
 from perception.values import TileSize, Wall
 
 MIN_POINTS = 100  # Fewer are a stray return, not a surface.
@@ -49,7 +50,7 @@ def find_wall(
     Raises:
         NoWallError: There are too few points, or no plane is near the expected one.
     """
-    config.validate()
+    validate(config, "segmentation")
     p_WQs = p_WQs[:, finite_points(p_WQs)]
     _, planes = segment_planes(
         p_WQs,

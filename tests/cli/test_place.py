@@ -43,7 +43,7 @@ def test_zones_that_cannot_be_name_option_value_and_bound(tmp_path, capsys):
     for words, text in (
         (["--exclude", "1,2,3"], "--exclude '1,2,3': expected two or more pairs"),
         (["--exclude", "1,1,9,2", "--wall", "5x2"], "x must be 0 to 5 m, got 9.0"),
-        (["--include", "1,1,1,2"], "must enclose more than 0 m²"),
+        (["--include", "1,1,1,2"], "corners: area must be > 0 m²"),
         (["--scene", "terrace", "--wall", "5x2"], "only one of them"),
     ):
         assert run(["place", *words, *out]) == 2

@@ -1,4 +1,4 @@
-"""Zones, tips by number, and the direction that cannot be."""
+"""Zones, and tips by number."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from painter.planning.film.tips import airless_tip
 from painter.planning.strokes.raster import plan_strokes
 from painter.planning.strokes.spray_settings import SpraySettings
 from painter.planning.zones import in_zones
+from perception.settings import validate
 
 MASK = np.ones((200, 200), dtype=bool)
 
@@ -40,7 +41,6 @@ def test_strokes_keep_out_of_a_zone():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"direction": "horizontal"}, "cannot roll"),
         ({"zones": [ZoneConfig(kind="maybe", corners=[[0, 0], [1, 1]])]}, "kind"),
         ({"zones": [ZoneConfig(corners=[[0, 0]])]}, "two or more pairs x, y"),
         (
@@ -49,14 +49,14 @@ def test_strokes_keep_out_of_a_zone():
         ),
         (
             {"zones": [ZoneConfig(corners=[[0.5, 0.2], [0.5, 0.9]])]},
-            r"raster\.zones\[0\]\.corners must enclose more than 0 m²",
+            r"raster\.zones\[0\]\.corners: area must be > 0 m²",
         ),
         ({"cut_in_standoff": 0.02}, "cut_in_standoff"),
     ],
 )
 def test_what_cannot_be_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
-        RasterConfig(**change).validate()
+        validate(RasterConfig(**change), "raster")
 
 
 def test_a_zone_beyond_the_tile_names_axis_value_and_bound():

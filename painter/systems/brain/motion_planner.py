@@ -11,6 +11,7 @@ from painter.systems.stage import Stage
 from perception.config import SegmentationConfig
 from perception.fine_steps.shadows import find_relief
 from perception.ground import check_positive
+from perception.settings import validate
 from perception.values import SurfaceMap, TileSize, Wall
 
 MORE_LOOKS = "more looks"
@@ -64,8 +65,9 @@ class MotionPlanner(Stage):
         check_positive(
             "motion_planner", cell=cell, standoff=planner.standoff, period=period
         )
-        for config in (planner.tile, planner.scan, planner.motion):
-            config.validate()
+        validate(planner.tile, "tile")
+        validate(planner.scan, "scan")
+        validate(planner.motion, "motion")
         super().__init__(stage="motion_planner", period=period)
         self._planner = planner
         self._cell = cell

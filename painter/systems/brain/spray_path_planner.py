@@ -12,6 +12,7 @@ from painter.planning.spray_path import PaintProgram, Stroke
 from painter.planning.tile import grid_shape
 from painter.systems.stage import Stage
 from perception.ground import check_positive
+from perception.settings import validate
 from perception.values import WallSegmentation
 
 
@@ -58,8 +59,10 @@ class SprayPathPlanner(Stage):
             ValueError: A setting is out of bounds.
         """
         check_positive("spray_path_planner", period=period)
-        for config in (tile, planner.tip, planner.raster, planner.motion):
-            config.validate()
+        validate(tile, "tile")
+        validate(planner.tip, "gun.tip")
+        validate(planner.raster, "raster")
+        validate(planner.motion, "motion")
         super().__init__(stage="spray_path_planner", period=period)
         self._tile = tile
         self._planner = planner

@@ -10,6 +10,7 @@ from perception.config import SegmentationConfig
 from perception.ground import check_positive
 from perception.mapping.config import PoseGraphConfig
 from perception.paper_steps.wall import find_wall
+from perception.settings import validate
 from perception.values import SurfaceMap, TileSize, Wall
 
 
@@ -57,7 +58,7 @@ class WallFinder(Stage):
             ValueError: A number is not positive or a threshold out of bounds.
         """
         check_positive("wall_finder", period=period, mount_limit_deg=mount_limit_deg)
-        config.validate()
+        validate(config, "segmentation")
         super().__init__(stage="wall_finder", period=period)
         self._X_WT_expected = X_WT_expected
         self._tile = tile

@@ -7,6 +7,7 @@ from painter.systems.values import UP_W
 from perception.config import SegmentationConfig
 from perception.ground import check_positive
 from perception.segmentation import segment_wall
+from perception.settings import validate
 from perception.values import SurfaceMap, TileSize, Wall, WallSegmentation
 
 
@@ -52,7 +53,7 @@ class WallSegmenter(Stage):
             ValueError: A number is not positive or a threshold out of bounds.
         """
         check_positive("wall_segmenter", period=period)
-        config.validate()
+        validate(config, "segmentation")
         super().__init__(stage="wall_segmenter", period=period)
         self._tile = tile
         self._config = config

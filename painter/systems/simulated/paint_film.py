@@ -13,6 +13,7 @@ from painter.planning.config import TipConfig
 from painter.planning.film.spray_cone import SprayCone, SpraySurface
 from painter.systems.ports import EvalAs
 from perception.ground import FloatArray, FrozenValue
+from perception.settings import validate
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,7 @@ class PaintFilm(LeafSystem):
         super().__init__()
         if not (np.isfinite(period) and period > 0.0):
             raise ValueError(f"period must be > 0 s, got {period!r}.")
-        tip.validate()
+        validate(tip, "gun.tip")
         self._surface = SpraySurface(height, cell=cell, origin=origin)
         self._cone = SprayCone(tip)
         self._tip = tip

@@ -13,6 +13,7 @@ from pydrake.math import RigidTransform
 from perception.config import MapConfig
 from perception.depth_camera.windows import moving_max
 from perception.ground import FloatArray, FrozenValue, IntArray
+from perception.settings import validate
 from perception.values import SurfaceMap
 
 _NORMAL_RADIUS = 3.0
@@ -67,7 +68,7 @@ class VoxelMap(FrozenValue):
         Raises:
             ValueError: A setting is out of bounds.
         """
-        config.validate()
+        validate(config, "map")
         return cls(
             X_WV=X_WV,
             width=width,

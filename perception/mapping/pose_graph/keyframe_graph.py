@@ -28,6 +28,7 @@ from perception.mapping.pose_graph.observability import (
 from perception.mapping.pose_graph.poses import Poses, angle_deg
 from perception.mapping.pose_graph.registration import find_constraints, overlap
 from perception.paper_steps.wall import upright_rotation
+from perception.settings import validate
 
 _Part = TypeVar("_Part")
 
@@ -75,7 +76,7 @@ class KeyframeGraph(FrozenValue):
         Raises:
             ValueError: A setting is out of bounds.
         """
-        config.validate()
+        validate(config, "mapping")
         return cls(
             intrinsics=intrinsics,
             config=config,
