@@ -1,4 +1,4 @@
-"""Running a paint cycle on either body: simulate, deploy, pre-flight, log, write.
+"""Running a paint cycle on either body: preflight, simulate, deploy, log, write.
 
 The only room that advances a simulator and writes a run folder from it.
 """

@@ -1,4 +1,4 @@
-"""What a simulated run goes on from: wall, film and open work of an earlier run."""
+"""The earlier run that a simulated run continues: wall, film and remaining strokes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from painter.run.figures.unfinished import rest_of_run, wall_of_run
 from painter.run.folder.folder import SCENARIO, RunFolder
 from painter.systems.simulated.paint_film import FilmState
 
-# What decides where the film lies and what the wall is.
+# Fields that a new run on the same wall and film must keep.
 _SAME = ("scene", "random_seed", "tile")
 
 
 @dataclass(frozen=True)
 class EarlierRun:
-    """An earlier run that a new one goes on from.
+    """An earlier run that a new one continues.
 
     Attributes:
-        job: Its scenario, with what the new run changes.
-        remainder: What the new run paints.
-        film: What is on the wall before it.
+        job: Its scenario, with the new run's overrides.
+        remainder: Strokes that the new run paints.
+        film: Film that is on the wall before it.
     """
 
     job: Scenario
@@ -38,14 +38,14 @@ class EarlierRun:
 
     @classmethod
     def to_resume(cls, path: Path, overrides: Sequence[str]) -> Self:
-        """Reads a run that was stopped; the rest of its strokes is painted.
+        """Reads a stopped run, to paint its remaining strokes.
 
         Args:
             path: Its folder.
             overrides: Words "key=value" over its scenario.
 
         Raises:
-            InputError: Nothing of the run can be gone on with; says why.
+            InputError: The run cannot be resumed; says why.
         """
         run, job = RunFolder.open(path), _job(path, overrides)
         return cls(job, rest_of_run(run), _film(run, job, None))
@@ -57,16 +57,16 @@ class EarlierRun:
         overrides: Sequence[str],
         cleared: list[list[float]] | None,
     ) -> Self:
-        """Reads a run whose film is mended where it is thin.
+        """Reads a run, to touch up its film where it is thin.
 
         Args:
             path: Its folder.
             overrides: Words "key=value" over its scenario.
-            cleared: Corners x, y in T, m, of the mark from which the film is taken
-                off first; None = nowhere.
+            cleared: Corners x, y in T, m, of the area whose film is removed first; None
+                = none.
 
         Raises:
-            InputError: The run has left no film, or it is thin nowhere.
+            InputError: The run has no film, or the film is thin nowhere.
         """
         run, job = RunFolder.open(path), _job(path, overrides)
         wall, film = wall_of_run(run), _film(run, job, cleared)
@@ -74,21 +74,21 @@ class EarlierRun:
         strokes = MakeProgramPlanner(job).touch_up_strokes(wall, seen)
         if not strokes:
             raise InputError(
-                f"{path}: the film is thin nowhere; nothing to mend.",
+                f"{path}: the film is thin nowhere; there is nothing to touch up.",
                 code="PNT-CYCLE-001",
             )
         return cls(job, Remainder(segmentation=wall, strokes=strokes), film)
 
 
 def _job(path: Path, overrides: Sequence[str]) -> Scenario:
-    """Returns a run's scenario with overrides that leave its wall where it is."""
+    """Returns a run's scenario with overrides that change nothing about its wall."""
     file = str(path / SCENARIO)
     before, job = load_scenario(file), load_scenario(file, overrides)
     for name in _SAME:
         old, new = getattr(before, name), getattr(job, name)
         if new != old:
             raise InputError(
-                f"--set {name}: must be that of {path}, {old}, got {new}.",
+                f"--set {name}: got {new}, but {path} has {old}; leave it out.",
                 code="PNT-CYCLE-002",
             )
     return job
@@ -97,7 +97,7 @@ def _job(path: Path, overrides: Sequence[str]) -> Scenario:
 def _film(
     run: RunFolder, job: Scenario, cleared: list[list[float]] | None
 ) -> FilmState:
-    """Returns the film that a run left, less what is cleared of it."""
+    """Returns the film of a run without the cleared area."""
     film, truth = film_and_truth(run)
     thickness = np.array(film.thickness)
     sprayed = film.sprayed
@@ -107,7 +107,7 @@ def _film(
         p_TQs = X_TS @ grid_points(x + film.x0, y + film.y0)
         gone = inside(cleared, p_TQs[:2].T)
         gone = gone.reshape(thickness.shape)
-        # As if it had never been sprayed, so that no paint is lost from the account.
+        # As if never sprayed, so that the mass balance holds.
         taken = float(thickness[gone].sum()) * film.cell**2
         sprayed -= taken / job.gun.tip.transfer_efficiency
         thickness[gone] = 0.0

@@ -1,7 +1,7 @@
 """The segmentation that a robot without any error would make of a scene.
 
-For planning without a simulation: tests and benchmarks plan in seconds what a cycle
-comes to after a minute.
+For planning without a simulation: tests and benchmarks reach in seconds the point that
+a cycle reaches after a minute.
 """
 
 import numpy as np
@@ -18,14 +18,14 @@ from perception.values import WallSegmentation
 
 
 def true_segmentation(scenario: Scenario, *, cell: float = 0.01) -> WallSegmentation:
-    """Returns what is truly on a scenario's tile, at the wall's true pose.
+    """Returns the true segmentation of a scenario's tile, at the wall's true pose.
 
     Args:
         scenario: Gives scene, seed and tile.
         cell: Edge of a cell, m.
 
     Returns:
-        Labels 1 = wall to be painted, 2 = all else; no cell is unseen.
+        Labels 1 = paintable wall, 2 = all else; no cell is unseen.
     """
     scene, X_WT = true_scene(scenario)
     ny, nx = grid_shape(scenario.tile, cell)

@@ -159,7 +159,7 @@ def _MakeCameraPose(scenario: Scenario, robot: RobotModel) -> CameraPose:
     return CameraPose(
         kinematics=robot.kinematics,
         length=JOINT_HISTORY,
-        X_CCm=RigidTransform(
+        X_NC=RigidTransform(
             RollPitchYaw(np.deg2rad(camera.calibrated_deg)), camera.calibrated_m
         ),
     )

@@ -1,4 +1,4 @@
-"""The robot's connection: CANopen drives and gun, and a depth camera."""
+"""The robot's station: CANopen drives and gun, and a depth camera."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,20 +11,20 @@ from painter.config import Scenario
 from painter.systems.hardware.canopen_arm import CanopenArm
 from painter.systems.hardware.realsense_camera import RealsenseCamera
 
-# Time between looks for a new picture, s; a camera takes 30 a second at most.
+# Time between checks for a new picture, s; a camera takes at most 30 per second.
 CAMERA_PERIOD = 0.02
 
 
 @dataclass(frozen=True)
 class RobotConnection:
-    """What a hardware station is connected to.
+    """The robot's devices, to which a hardware station connects.
 
     Attributes:
         bus: With its drives enabled.
-        clock: The diagram's time on it.
+        clock: Maps the diagram's time to the bus's clock.
         cycle: Time between two SYNCs, s.
-        read_camera: Returns the newest of the camera without waiting.
-        gun_off: Whether the gun stays closed, whatever the brain says.
+        read_camera: Returns the camera's newest reading without waiting.
+        gun_off: Whether the gun stays closed, whatever the brain commands.
     """
 
     bus: Bus
@@ -38,8 +38,8 @@ def MakeHardwareStation(scenario: Scenario, connection: RobotConnection) -> Diag
     """Makes the robot's station.
 
     Args:
-        scenario: Sizes of the camera's pictures.
-        connection: What it is connected to.
+        scenario: Gives the sizes of the camera's pictures.
+        connection: The robot.
 
     Returns:
         A diagram with the ports of `painter.diagrams.station`.

@@ -1,4 +1,4 @@
-"""The drives' position loops on the arm's plant, the same in all simulated bodies."""
+"""The drives' position loops on the arm's plant, one for all simulated bodies."""
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -15,7 +15,7 @@ from painter.config import Scenario
 from painter.planning.arm.kinematics import NQ
 from painter.robot.arm_model import MakeArmPlant
 
-# The drives differentiate their velocity set-point over this time for feed-forward.
+# Time over which drives differentiate the velocity setpoint for feed-forward, s.
 FEED_FORWARD_PERIOD = 0.004
 
 

@@ -24,12 +24,12 @@ def MakeSimStation(
 ) -> Diagram:
     """Makes the simulated station of a scenario.
 
-    The arm stands at its nominal pose in W; the errors of the base placement move the
-    scene instead, which comes to the same for the robot.
+    The arm's base is at its nominal pose in W. Errors of its placement move the scene
+    instead, which is equivalent for the robot.
 
     Args:
         scenario: Robot, scene, camera and gun.
-        film: What is on the wall already; None = nothing.
+        film: Film that is on the wall already; None = none.
         meshcat: Where to show robot and scene, or None.
 
     Returns:
@@ -68,7 +68,7 @@ def MakeSimStation(
 def _AddDrives(
     builder: DiagramBuilder, plant: MultibodyPlant, scenario: Scenario
 ) -> None:
-    """Adds encoders, the drives' joint loops and what the drives report."""
+    """Adds encoders, the drives' joint loops and their status."""
     arm = plant.GetModelInstanceByName("arm")
     encoder = builder.AddNamedSystem(
         "joint_encoder", JointEncoder(bits=scenario.arm.encoder_bits)

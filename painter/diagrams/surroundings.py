@@ -1,7 +1,7 @@
-"""What is around the robot in simulation: scene, camera, paint film, clearances.
+"""The robot's surroundings in simulation: scene, camera, paint film, clearances.
 
-The simulated station has it around a plant that moves, a simulated world beside
-simulated drives around an arm that is posed.
+The simulated station adds them to a plant that moves, the world of a rehearsal to an
+arm that is posed.
 """
 
 import dataclasses
@@ -42,7 +42,7 @@ from painter.systems.simulated.paint_film import FilmState, PaintFilm
 from painter.systems.simulated.stereo_camera import StereoCamera, render_camera_info
 from perception.depth_camera.depth import CameraIntrinsics
 
-# Renderers: what light sees, and the same with panes of glass opaque.
+# Renderers: glass transparent, and glass opaque.
 SCENE_RENDERER = "scene"
 GLASS_RENDERER = "with_glass"
 FILM_CELL = 0.01
@@ -51,7 +51,7 @@ FILM_MARGIN = 0.35
 
 @functools.cache
 def _SceneFiles() -> tempfile.TemporaryDirectory:
-    """Returns the folder for scenes' meshes; it goes when the process ends."""
+    """Returns the folder for scenes' meshes, removed when the process ends."""
     return tempfile.TemporaryDirectory(prefix="painter-scene-")
 
 
@@ -60,10 +60,10 @@ def AddScene(plant: MultibodyPlant, scene: Scene, X_WS: RigidTransform) -> None:
 
     Args:
         plant: Not finalised, with the robot in it.
-        scene: What stands before the robot.
+        scene: In front of the robot.
         X_WS: Pose of the scene's frame S.
     """
-    # Renderers and Meshcat read the mesh and picture of a textured wall later on.
+    # Renderers and Meshcat read the mesh and texture of a wall later on.
     folder = tempfile.mkdtemp(dir=_SceneFiles().name)
     Parser(plant).AddModelsFromString(scene_sdf(scene, Path(folder)), "sdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("scene"), X_WS)
@@ -93,10 +93,10 @@ def AddSurroundings(
         plant: With robot and scene; need not be in the builder.
         scene_graph: With the geometry of the plant.
         scenario: Camera and gun.
-        scene: What stands before the robot.
+        scene: In front of the robot.
         X_WS: Pose of the scene's frame S.
         state: (10,) true q, v of the arm; rad, rad/s.
-        film: What is on the wall already; None = nothing.
+        film: Film that is on the wall already; None = none.
     """
     camera = _AddWallCamera(builder, plant, scene_graph, scenario)
     _AddGun(
@@ -115,9 +115,9 @@ def AddSurroundings(
 def _AddClearance(
     builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph
 ) -> None:
-    """Adds monitors of the robot's distance from the scene, and from floor and frame.
+    """Adds monitors of the robot's clearance from the scene, and from floor and frame.
 
-    The base stands on the frame, so that one is not asked about.
+    The base is left out: it stands on the frame.
     """
     base = plant.GetBodyByName("base", plant.GetModelInstanceByName("arm"))
 

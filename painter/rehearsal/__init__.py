@@ -1,4 +1,4 @@
-"""What stands in for the robot: simulated drives with arm, world and camera.
+"""Stand-ins for the robot: simulated drives with arm, world and camera.
 
-Serves `painter drives`; a cycle does not know it.
+Used by `painter drives` and by tests; a cycle knows nothing of them.
 """

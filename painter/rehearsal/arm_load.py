@@ -15,10 +15,10 @@ from perception.ground import FloatArray
 
 
 class ArmLoad:
-    """What hangs on the motors, with the position loops that the drives close on it.
+    """The arm on the motors, with the position loops that the drives close on it.
 
-    Plant and loops are the simulated station's, so that what a simulated cycle and one
-    over the bus do differently is the bus's doing. It is a `painter.canopen.sim` load:
+    Plant and loops are the simulated station's: any difference between a simulated
+    cycle and one over the bus comes from the bus. It is a `painter.canopen.sim` load:
     axes are the motors' after the gears, the wrist's differential included.
     """
 
@@ -45,9 +45,9 @@ class ArmLoad:
         self._simulator = Simulator(diagram)
         self._context = self._simulator.get_mutable_context()
         self._state_port = diagram.GetOutputPort("state")
-        self._asked = np.concatenate([home, np.zeros(NQ)])
+        self._target = np.concatenate([home, np.zeros(NQ)])
         self._desired = diagram.GetInputPort("desired_state").FixValue(
-            self._context, self._asked
+            self._context, self._target
         )
         self._simulator.Initialize()
         self._steps = 0
@@ -64,12 +64,12 @@ class ArmLoad:
 
     def step(self, demand: FloatArray, velocity: FloatArray, dt: float) -> None:
         """See `painter.canopen.sim.load.Load`."""
-        # The demand is for the step's end, the loop closes at its beginning: there it
-        # is held against what was asked for then.
-        self._desired.GetMutableData().get_mutable_value().SetFromVector(self._asked)
-        self._asked = np.concatenate(
+        # The demand is for the step's end, but the loop closes at its beginning: it
+        # compares the state there with the demand of the last step.
+        self._desired.GetMutableData().get_mutable_value().SetFromVector(self._target)
+        self._target = np.concatenate(
             [joints_from_axes(demand), joints_from_axes(velocity)]
         )
         self._steps += 1
-        # Not the sum of dt: the plant's own steps are at whole multiples.
+        # Not a sum of dt: the plant steps at whole multiples of its period.
         self._simulator.AdvanceTo(self._steps * dt)

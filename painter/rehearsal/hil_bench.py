@@ -19,7 +19,7 @@ _STEPS = round(PERIOD / STEP)
 
 
 class HilBench:
-    """What simulated drives move, see and paint.
+    """Arm, world and camera of simulated drives.
 
     Attributes:
         load: The arm on the motors.
@@ -30,7 +30,7 @@ class HilBench:
 
         Args:
             job: Robot and scene.
-            camera: Path of the socket on which pictures are to be had.
+            camera: Path of the socket that serves the pictures.
 
         Raises:
             PainterError: The world cannot be made.
@@ -41,7 +41,7 @@ class HilBench:
         self._count = 0
 
     def attach(self, server: RackServer) -> None:
-        """Lets the world follow what a server's drives do from now on."""
+        """Makes the world follow the drives of a server from now on."""
         config, io = server.rack.bus.io, server.rack.io
 
         def step() -> None:
@@ -55,14 +55,14 @@ class HilBench:
         server.rack.stepped = step
 
     def finish(self, run: Path | None) -> None:
-        """Ends the world and adds what it knows to a run.
+        """Ends the world and adds its truth to a run.
 
         Args:
-            run: Folder of a run of `painter deploy` that has ended, or None.
+            run: Folder of a finished run of `painter deploy`, or None.
 
         Raises:
-            InputError: There is no such run, or it has not come to see the wall.
-            PainterError: The world has ended before, or the film is not whole.
+            InputError: There is no such run, or it has no segmentation.
+            PainterError: The world ended early, or its film has gaps.
         """
         try:
             truth = self._world.finish()
@@ -74,12 +74,12 @@ class HilBench:
         segmentation = folder.segmentation()
         if segmentation is None:
             raise InputError(
-                f"{run / SEGMENTATION}: no such file; no truth was added.",
+                f"{run / SEGMENTATION}: no such file; truth was not added.",
                 code="PNT-REHEARSAL-001",
             )
         if truth.lost:
             raise PainterError(
-                f"the world missed {truth.lost} samples of the arm: no film was added.",
+                f"the world missed {truth.lost} samples of the arm; no film was added.",
                 code="PNT-REHEARSAL-002",
             )
         write_truth(folder, self._job, segmentation, truth.film)

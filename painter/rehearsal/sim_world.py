@@ -1,4 +1,4 @@
-"""What is around an arm that simulated drives move: scene, camera and paint film."""
+"""Scene, camera and paint film around an arm that simulated drives move."""
 
 from dataclasses import dataclass
 
@@ -25,11 +25,11 @@ CLEARANCE_PERIOD = 0.05
 
 @dataclass(frozen=True, eq=False)
 class WorldPicture:
-    """A picture that the simulated camera took.
+    """A picture of the simulated camera.
 
     Attributes:
         depth_mm: (H, W) uint16, mm, 0 = no return.
-        time: When, by the world's clock, s.
+        time: When it was taken, by the world's clock, s.
     """
 
     depth_mm: npt.NDArray[np.uint16]
@@ -37,10 +37,10 @@ class WorldPicture:
 
 
 class SimWorld:
-    """Camera, paint film and clearances of an arm whose motion is given.
+    """Camera, paint film and clearances of an arm with prescribed motion.
 
-    It is the simulated station without drives and plant: what that one's plant says of
-    the arm's true state is said here, sample by sample.
+    It is the simulated station without drives and plant: samples of the arm's true
+    state take the plant's place.
     """
 
     def __init__(self, scenario: Scenario, *, film: FilmState | None = None) -> None:
@@ -48,7 +48,7 @@ class SimWorld:
 
         Args:
             scenario: Robot, scene, camera and gun.
-            film: What is on the wall already; None = nothing.
+            film: Film that is on the wall already; None = none.
         """
         builder = DiagramBuilder()
         scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
@@ -91,7 +91,7 @@ class SimWorld:
         }
         for name in ("state", "gun.trigger"):
             outer.ExportInput(self._world.GetInputPort(name), name)
-        self._plant = plant  # Geometry poses are computed with it.
+        self._plant = plant  # Kept alive: `geometry_pose` computes with it.
         self._root = outer.Build()
         self._simulator = Simulator(self._root)
         self._context = self._simulator.get_mutable_context()
@@ -102,29 +102,29 @@ class SimWorld:
 
     @property
     def time(self) -> float:
-        """Where it is, s."""
+        """Present time of the world, s."""
         return float(self._context.get_time())
 
     @property
     def film(self) -> FilmState:
-        """What is on the wall."""
+        """The film on the wall."""
         film: FilmState = self._evaluate("cheat.film")
         return film
 
     def advance(self, time: float, state: FloatArray, trigger: float) -> None:
-        """Goes on to a time at which the arm is in a state.
+        """Advances to a time at which the arm has a given state.
 
         Args:
             time: Later than before, s.
             state: (10,) true q, v; rad, rad/s.
-            trigger: Of the gun, 0 to 1, as its valve is.
+            trigger: Opening of the gun's valve, 0 to 1.
         """
-        # What is due at a time is done as that time is left, with its own state.
+        # Events due at the present time still use its state: set the new one after.
         self._simulator.AdvanceTo(time)
         self._set(state, trigger)
 
     def picture(self) -> WorldPicture | None:
-        """Returns the newest picture, once."""
+        """Returns the newest picture, each once, or None."""
         time = float(self._evaluate("wall_camera.image_time")[0])
         if time <= self._picture_time:
             return None
@@ -133,7 +133,7 @@ class SimWorld:
         return WorldPicture(depth, time)
 
     def color(self) -> npt.NDArray[np.uint8]:
-        """Returns a colour picture of now, (H, W, 3) RGB."""
+        """Returns the present colour picture, (H, W, 3) RGB."""
         return self._evaluate("wall_camera.color_image").data[:, :, :3].copy()
 
     def clearances(self) -> tuple[FloatArray, FloatArray, FloatArray]:

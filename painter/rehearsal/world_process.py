@@ -1,7 +1,7 @@
 """The simulated world beside simulated drives, in a process of its own.
 
-Drives must never wait for a picture to be rendered: they put the arm's true state into
-shared memory, and here camera, film and clearances follow as fast as they can.
+Drives must never wait for rendering: they put the arm's true state into shared memory,
+and camera, film and clearances follow in this process as fast as they can.
 """
 
 import contextlib
@@ -26,9 +26,9 @@ from perception.ground import FloatArray
 
 # Time between samples of the arm's true state, s.
 PERIOD = 0.01
-# A colour picture with every so many depth pictures: nothing but the report shows them.
+# Depth pictures per colour picture, which only the report shows.
 _COLOR_EVERY = 5
-# While the gun sprays, the lens is covered: black pictures at this period, s.
+# Period of black pictures while the lens is covered because the gun sprays, s.
 _BLACK_PERIOD = 0.25
 _PATIENCE = 120.0
 _NICENESS = -15
@@ -36,14 +36,14 @@ _NICENESS = -15
 
 @dataclass(frozen=True, eq=False)
 class WorldTruth:
-    """What the world knows when a cycle has ended.
+    """Truth of the world at the end of a cycle.
 
     Attributes:
         film: On the wall.
         stamps: (k,) s by the run's clock, of the clearances.
         clearance: (k,) m, from the scene.
         floor_clearance: (k,) m, from the floor and the robot's own frame.
-        lost: Samples that were overwritten before they were read; the film lacks them.
+        lost: Samples overwritten before they were read; the film lacks them.
     """
 
     film: FilmState
@@ -54,14 +54,14 @@ class WorldTruth:
 
 
 class WorldProcess:
-    """The drives' side of the world."""
+    """The world process, as the drives use it."""
 
     def __init__(self, scenario: Scenario, *, camera: str) -> None:
-        """Starts the process and waits until the world is there.
+        """Starts the process and waits until the world is ready.
 
         Args:
             scenario: Robot, scene, camera and gun.
-            camera: Path of the socket on which pictures are to be had.
+            camera: Path of the socket that serves the pictures.
 
         Raises:
             PainterError: The world cannot be made; says why.
@@ -79,20 +79,20 @@ class WorldProcess:
         self._receive()
 
     def put(self, when: float, state: FloatArray, trigger: float) -> None:
-        """Says how the arm is; to be called every `PERIOD`.
+        """Adds a sample of the arm; to be called every `PERIOD`.
 
         Args:
             when: By the run's clock, s.
             state: (10,) true q, v; rad, rad/s.
-            trigger: What the gun does, 0 to 1.
+            trigger: Opening of the gun's valve, 0 to 1.
         """
         self._ring.put(when, state[:NQ], state[NQ:], trigger)
 
     def finish(self) -> WorldTruth:
-        """Waits until all is worked out, and ends the process.
+        """Waits until all samples are processed, and ends the process.
 
         Raises:
-            PainterError: The world has ended before; says why.
+            PainterError: The world ended early; says why.
         """
         self._pipe.send("end")
         truth = self._receive()
@@ -100,7 +100,7 @@ class WorldProcess:
         return truth
 
     def close(self) -> None:
-        """Ends the process, whatever it does."""
+        """Ends the process, by force if need be."""
         self._pipe.close()
         self._process.join(5.0)
         if self._process.is_alive():
@@ -112,7 +112,7 @@ class WorldProcess:
         try:
             if not self._pipe.poll(_PATIENCE):
                 raise PainterError(
-                    f"the simulated world is silent for {_PATIENCE} s.",
+                    f"the simulated world has not answered for {_PATIENCE:g} s.",
                     code="PNT-REHEARSAL-003",
                 )
             answer = self._pipe.recv()
@@ -126,7 +126,7 @@ class WorldProcess:
 
 
 class _Follower:
-    """Follows the arm's samples with a world, and hands pictures on."""
+    """Makes a world follow the arm's samples, and serves its pictures."""
 
     def __init__(self, world: SimWorld, server: FrameServer) -> None:
         self._world = world
@@ -138,7 +138,7 @@ class _Follower:
         self.lost = 0
 
     def take(self, when: float, state: FloatArray, trigger: float) -> None:
-        """Goes on by one sample."""
+        """Advances by one sample."""
         self._stamps.append(when)
         now = (len(self._stamps) - 1) * PERIOD
         self._world.advance(now, state, trigger)
@@ -158,14 +158,14 @@ class _Follower:
             self._server.send(np.zeros(self._shape, np.uint16), None, when)
 
     def truth(self) -> WorldTruth:
-        """Returns what is known now."""
+        """Returns the present truth."""
         time_w, clearance, floor = self._world.clearances()
         stamps = np.array(self._stamps)[np.rint(time_w / PERIOD).astype(int)]
         return WorldTruth(self._world.film, stamps, clearance, floor, self.lost)
 
 
 def _read(text: str) -> Scenario:
-    """Reads a scenario that came as text; Drake's settings in it do not pickle."""
+    """Reads a scenario from its text: Drake's settings in it do not pickle."""
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
         file.write(text)
         file.flush()
@@ -173,9 +173,9 @@ def _read(text: str) -> Scenario:
 
 
 def _run(scenario: str, ring_name: str, camera: str, pipe: Connection) -> None:
-    """The world's process: Ctrl-C is the parent's business."""
+    """Runs the world's process; the parent handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    set_niceness(_NICENESS)  # A camera waits for no other program.
+    set_niceness(_NICENESS)  # A real camera waits for no program.
     ring = SampleRing(name=ring_name)
     server = None
     try:

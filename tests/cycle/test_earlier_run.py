@@ -21,7 +21,7 @@ def test_options_that_do_not_fit_are_refused(earlier, tmp_path, capsys):
         (["cubes", "--resume", earlier], "has a scenario of its own"),
         (["--resume", str(tmp_path / "none")], "no such folder"),
         (["--resume", earlier], "was not stopped"),
-        (["--resume", earlier, "--seed", "7"], "--set random_seed: must be that of"),
+        (["--resume", earlier, "--seed", "7"], "--set random_seed: got 7, but"),
         (["--touch-up", earlier], "segmentation.npz: no such file"),
     ):
         out = tmp_path / "out"

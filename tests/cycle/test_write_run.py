@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from painter.config import Scenario, dump_scenario
-from painter.cycle.cycle_log import CycleLog, clearance_violations
+from painter.cycle.cycle_log import clearance_violations
 from painter.cycle.write_run import event_watch, write_collisions, write_log
 from painter.planning.config import ZoneConfig
 from painter.planning.tile import nominal_tile_pose
@@ -16,7 +16,8 @@ from painter.scene.config import OpeningConfig, Scene
 from painter.scene.load import dump_scene
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
-from perception.values import SurfaceMap, WallSegmentation
+from perception.values import WallSegmentation
+from tests.cycle.hand_made_log import cycle_log
 
 # x0, x1, y0, y1 in S, m.
 WINDOW = (0.6, 1.4, 0.7, 1.6)
@@ -60,34 +61,6 @@ def film():
         sprayed=2e-3,
         missed=1e-4,
     )
-
-
-def cycle_log(**changes):
-    """Two samples of an arm that stood still."""
-    values = {
-        "status": CycleStatus(phase=Phase.DONE, finished=True),
-        "end_time": 1.0,
-        "time": np.array([0.0, 1.0]),
-        "q": np.zeros((2, 5)),
-        "v": np.zeros((2, 5)),
-        "trigger": np.array([0.0, 1.0]),
-        "X_WG": np.tile(np.eye(4), (2, 1, 1)),
-        "X_WG_desired": np.tile(np.eye(4), (2, 1, 1)),
-        "clearance_time": np.zeros(0),
-        "clearance": np.zeros(0),
-        "floor_clearance": np.zeros(0),
-        "surface_map": SurfaceMap.empty().replace(
-            p_WQs=np.array([[1.0], [2.0], [3.0]]),
-            normals_W=np.array([[-1.0], [0.0], [0.0]], dtype=np.float32),
-            counts=np.array([3]),
-            variances=np.array([1e-6], dtype=np.float32),
-        ),
-        "segmentation": None,
-        "program": None,
-        "film": None,
-        "look_image": None,
-    }
-    return CycleLog(**(values | changes))
 
 
 def in_window(x, y):

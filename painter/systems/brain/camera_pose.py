@@ -1,4 +1,4 @@
-"""Pose of the depth camera when its picture was taken, from measured joints."""
+"""Pose of the depth camera at the time of its picture, from measured joints."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class ImageTimeError(PainterError):
 
 @dataclass(frozen=True, eq=False)
 class JointHistory(FrozenValue):
-    """Joint positions over the last moments.
+    """The latest joint positions.
 
     Attributes:
         time: (n,) s, strictly increasing.
@@ -30,13 +30,13 @@ class JointHistory(FrozenValue):
 
     @classmethod
     def empty(cls) -> "JointHistory":
-        """Makes a history of nothing."""
+        """Makes an empty history."""
         return cls(time=np.zeros(0), q=np.zeros((0, NQ)))
 
     def append(self, time: float, q: FloatArray, *, length: float) -> "JointHistory":
         """Returns the history with `q` at `time`, s, back to `length` s before it.
 
-        What the history held from `time` on is replaced.
+        Samples from `time` on are replaced.
         """
         keep = (self.time >= time - length) & (self.time < time)
         return JointHistory(
@@ -49,7 +49,7 @@ class JointHistory(FrozenValue):
 
 
 class CameraPose(LeafSystem):
-    """Looks up where the camera was when its last picture was taken.
+    """Gives the pose of the camera at the time of its last picture.
 
     .. pydrake_system::
 
@@ -66,7 +66,7 @@ class CameraPose(LeafSystem):
         X_WC: RigidTransform at `image_time`; before the first picture, now.
 
     State is one JointHistory, to which q is added every `period` s from t = 0 on. Both
-    bodies use this system: nothing but measured joints tells where the camera was.
+    bodies use this system: the pose comes from measured joints alone.
     """
 
     def __init__(
@@ -75,15 +75,15 @@ class CameraPose(LeafSystem):
         kinematics: ArmKinematics,
         period: float = 0.01,
         length: float = 1.0,
-        X_CCm: RigidTransform | None = None,
+        X_NC: RigidTransform | None = None,
     ) -> None:
         """Creates the system.
 
         Args:
             kinematics: Of the arm, with the camera's modelled mount.
             period: Time between samples of q, s.
-            length: How far back samples are kept, s.
-            X_CCm: The calibrated camera frame, seen from where the model has it; None =
+            length: Age up to which samples are kept, s.
+            X_NC: Calibrated camera frame C in the nominal one N of the model; None =
                 as modelled.
 
         Raises:
@@ -96,7 +96,7 @@ class CameraPose(LeafSystem):
                 f"got {period!r} and {length!r}."
             )
         self._kinematics = kinematics
-        self._X_CCm = RigidTransform() if X_CCm is None else X_CCm
+        self._X_NC = RigidTransform() if X_NC is None else X_NC
         self._length = length
         # Inputs.
         self._state_port = self.DeclareVectorInputPort("state", 2 * NQ)
@@ -119,7 +119,7 @@ class CameraPose(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateHistory)
 
     def _History(self, context: Context) -> JointHistory:
-        """Returns the history up to and with now."""
+        """Returns the history including the present sample."""
         history = context.get_abstract_state(int(self._history_index)).get_value()
         q = self._state_port.Eval(context)[:NQ]
         return history.append(context.get_time(), q, length=self._length)
@@ -133,13 +133,13 @@ class CameraPose(LeafSystem):
         if not history.time[0] <= time <= now:
             name = self.GetSystemPathname()
             raise ImageTimeError(
-                f"{name}: the picture is {now - time:.3f} s old; joint positions "
-                f"reach back {now - history.time[0]:.3f} s.",
+                f"{name}: the picture is {now - time:.3f} s old, the oldest joint "
+                f"positions {now - history.time[0]:.3f} s.",
                 code="PNT-CYCLE-003",
             )
-        R_WC, p_WC = self._kinematics.camera_poses(history.at(time)[np.newaxis])
-        X_WC = RigidTransform(RotationMatrix(R_WC[0]), p_WC[0])
-        output.set_value(X_WC @ self._X_CCm)
+        R_WN, p_WN = self._kinematics.camera_poses(history.at(time)[np.newaxis])
+        X_WN = RigidTransform(RotationMatrix(R_WN[0]), p_WN[0])
+        output.set_value(X_WN @ self._X_NC)
 
     def _UpdateHistory(self, context: Context, state: State) -> EventStatus:
         index = int(self._history_index)

@@ -21,13 +21,13 @@ from perception.values import SurfaceMap, Wall
 
 @dataclass(frozen=True, eq=False)
 class MapProgress(FrozenValue):
-    """How far the map is.
+    """The map and what is already in it.
 
     Attributes:
         map: The map.
-        image_time: Of the last picture fused, s; -1 = none yet.
-        wall_number: Of the StageResult whose wall the map is laid on; 0 = the nominal
-            one.
+        image_time: Time of the last picture fused, s; -1 = none yet.
+        wall_number: Number of the StageResult whose tile frame the map uses; 0 = the
+            nominal one.
     """
 
     map: LiveMap
@@ -36,7 +36,7 @@ class MapProgress(FrozenValue):
 
 
 class MapAccumulator(LeafSystem):
-    """Fuses depth pictures into one map, laid along the wall.
+    """Fuses depth pictures into one map in the wall's tile frame.
 
     .. pydrake_system::
 
@@ -52,15 +52,15 @@ class MapAccumulator(LeafSystem):
 
     Ports:
         depth_image: ImageDepth16U, mm, 0 = no return.
-        image_time: (1,) s, when that was taken; negative before the first.
+        image_time: (1,) s, when it was taken; negative before the first.
         X_WC: RigidTransform, pose of the camera at `image_time`; read only when there
             is a new picture.
         wall: StageResult; each new one that holds a Wall restarts the map in that
             wall's tile frame. May be left unconnected.
-        enabled: (1,); 0 = fuse nothing. May be left unconnected: all is fused.
-        surface_map: SurfaceMap in W of all that was fused since the last restart, at
-            the poses that the pose graph makes of the arm's; see `LiveMap`. Costs up to
-            some seconds to evaluate, once after each picture.
+        enabled: (1,); 0 = fuse nothing. May be left unconnected: fuse all.
+        surface_map: SurfaceMap in W of all pictures fused since the last restart, at
+            the arm's poses as the pose graph corrects them; see `LiveMap`. Evaluating
+            it takes up to some seconds, once after each picture.
 
     State is one MapProgress, updated every `period` s, first at t = 0. Each picture is
     fused once; one taken while `enabled` was 0 is not fused later unless it is still
@@ -81,11 +81,11 @@ class MapAccumulator(LeafSystem):
 
         Args:
             config: Of the map.
-            pose_graph: Of what corrects the arm's poses.
+            pose_graph: Of the correction of the arm's poses.
             intrinsics: Of the depth camera.
-            tile: Its size is used.
-            X_WT: Where the tile is expected, until `wall` says better.
-            period: Time between looks for a new picture, s.
+            tile: Gives the size.
+            X_WT: Expected pose of the tile, until `wall` gives a better one.
+            period: Time between checks for a new picture, s.
 
         Raises:
             ValueError: A setting is out of bounds or `period` not a positive number.
@@ -120,8 +120,7 @@ class MapAccumulator(LeafSystem):
         return context.get_abstract_state(int(self._progress_index)).get_value()
 
     def _CalcSurfaceMap(self, context: Context, output: Value) -> None:
-        # The map keeps its surface: Drake's cache is emptied by every event, changed
-        # or not.
+        # The map caches its surface itself: every event clears Drake's cache.
         output.set_value(self._Progress(context).map.surface_map)
 
     def _UpdateMap(self, context: Context, state: State) -> EventStatus:
@@ -134,7 +133,7 @@ class MapAccumulator(LeafSystem):
         return EventStatus.Succeeded()
 
     def _Restart(self, context: Context, progress: MapProgress) -> MapProgress:
-        """Returns an empty map in the tile frame of a wall newly found, if any."""
+        """Returns an empty map in the tile frame of a newly found wall, if any."""
         if not self._wall_port.HasValue(context):
             return progress
         result = EvalAs(self._wall_port, context, StageResult)
@@ -144,7 +143,7 @@ class MapAccumulator(LeafSystem):
         return progress.replace(map=empty, wall_number=result.number)
 
     def _Fuse(self, context: Context, progress: MapProgress) -> MapProgress:
-        """Returns the map with the last picture in it, if that is a new one."""
+        """Returns the map with the last picture fused, if that is a new one."""
         if self._enabled_port.HasValue(context) and (
             self._enabled_port.Eval(context)[0] == 0.0
         ):
@@ -153,7 +152,7 @@ class MapAccumulator(LeafSystem):
         if image_time < 0.0 or image_time == progress.image_time:
             return progress
         depth_mm = EvalAs(self._depth_port, context, ImageDepth16U).data[:, :, 0]
-        # A copy: what the port gives out is overwritten with the next pose.
+        # A copy: the port's value is overwritten with the next pose.
         X_WC = RigidTransform(EvalAs(self._pose_port, context, RigidTransform))
         fused = progress.map.fused(image_time, depth_mm, X_WC)
         return progress.replace(map=fused, image_time=image_time)

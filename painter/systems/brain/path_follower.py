@@ -1,4 +1,4 @@
-"""Follows an arm motion: desired joint state and gun trigger at any time."""
+"""Follows an arm motion: desired joint state and gun trigger over time."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -20,7 +20,8 @@ from painter.systems.ports import EvalAs
 from painter.systems.values import FollowerStatus, MotionCommand
 from perception.ground import FloatArray, FrozenValue
 
-# A motion begins where the arm stands: 1 mrad is 2 mm at full reach.
+# Largest gap between the arm and the start of a motion; 1 mrad is 2 mm at full
+# reach, rad.
 START_TOLERANCE = 1e-3
 
 
@@ -28,8 +29,8 @@ START_TOLERANCE = 1e-3
 class PathClock(FrozenValue):
     """Time along a motion as a function of the diagram's time.
 
-    The rate of path time ramps linearly, so that stopping and starting anywhere on a
-    motion keeps joint speed continuous and accelerations near the planned ones.
+    The rate of path time ramps linearly: stopping and starting anywhere on a motion
+    keeps joint speeds continuous and accelerations near the planned ones.
 
     Attributes:
         start: Diagram time at which the ramp begins, s.
@@ -71,9 +72,9 @@ class FollowerState(FrozenValue):
     Attributes:
         number: Of the motion being followed; 0 = none yet.
         motion: That motion, or None.
-        clock: Where on it the arm is.
-        sprayed_to: Path time up to which the motion's spraying is done, s.
-        q_hold: (5,) rad, held while there is no motion.
+        clock: Path time along it.
+        sprayed_to: Path time up to which the motion is sprayed, s.
+        q_hold: (5,) rad, held without a motion.
     """
 
     number: int
@@ -99,23 +100,22 @@ class PathFollower(LeafSystem):
 
     Ports:
         motion_command: MotionCommand.
-        state: (10,) measured q, v; rad, rad/s. Read once, at the start, to hold there.
+        state: (10,) measured q, v; rad, rad/s. Read once, at the start, and held.
         desired_state: (10,) q, v; rad, rad/s.
-        trigger: (1,) 0 to 1 of the nominal flow. Open only at the planned speed: the
-            film would be thicker anywhere else.
+        trigger: (1,) 0 to 1 of the nominal flow. Open only at the planned speed: at any
+            other the film would be thicker.
         status: FollowerStatus.
 
-    A motion that was stopped while its gun was to be open is resumed as a machine tool
-    resumes a cut: the arm backs up along its own path, and the gun opens again where
-    it closed, at full speed.
+    A motion stopped in a stroke resumes like a cut on a machine tool: the arm backs up
+    along its path, and the gun opens again where it closed, at full speed.
     """
 
     def __init__(self, *, period: float, ramp: float = 0.3) -> None:
         """Creates the follower.
 
         Args:
-            period: Time between looks at the command, s.
-            ramp: Time from planned speed to a stand, s.
+            period: Time between checks for a new command, s.
+            ramp: Time from planned speed to standstill, s.
 
         Raises:
             ValueError: A time is not positive.
@@ -189,7 +189,7 @@ class PathFollower(LeafSystem):
             now = now.replace(sprayed_to=max(now.sprayed_to, done))
             return self._SetState(state, now.replace(clock=clock.turned_to(0.0, time)))
         if command.rate == 1.0 and clock.target != 1.0 and rate == clock.target:
-            # At full rate again before the gun is to open where it closed.
+            # Reach full rate before the point where the gun closed.
             run_up = 0.5 * clock.ramp + 0.1
             missed = motion.sprays_within(now.sprayed_to, position + run_up)
             back = missed and position > max(now.sprayed_to - run_up, clock.ramp)
@@ -206,7 +206,7 @@ class PathFollower(LeafSystem):
             name = self.GetSystemPathname()
             raise MotionLimitError(
                 f"{name}: a motion starts {jump.max():.4f} rad from "
-                f"where the arm is (joint {jump.argmax() + 1}, speed "
+                f"the arm (joint {jump.argmax() + 1}, speed "
                 f"{np.abs(q_v[NQ:]).max():.4f} rad/s); bound {START_TOLERANCE} rad.",
                 code="PNT-CYCLE-005",
             )

@@ -21,17 +21,17 @@ from painter.systems.ports import EvalAs
 from painter.systems.values import ArmStatus, CameraStatus, DriveStatus, Fault
 from perception.ground import FloatArray, FrozenValue
 
-# How far back samples are read: what the diagram may be behind, and a few cycles.
+# Age up to which samples are read: the diagram's delay and a few cycles, s.
 _HISTORY = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class ArmReading(FrozenValue):
-    """What was last read of the bus.
+    """The last reading of the bus.
 
     Attributes:
         state: (10,) q, v as measured at the diagram's time; rad, rad/s.
-        status: Of the drives, as they are now.
+        status: Of the drives now.
     """
 
     state: FloatArray
@@ -39,7 +39,7 @@ class ArmReading(FrozenValue):
 
 
 class CanopenArm(LeafSystem):
-    """Sends setpoints to the bus and reads what it measures.
+    """Sends setpoints to the bus and reads its measurements.
 
     .. pydrake_system::
 
@@ -77,7 +77,7 @@ class CanopenArm(LeafSystem):
             bus: With its drives enabled.
             clock: The diagram's time on the bus.
             period: Time between setpoints, s; the bus's cycle.
-            gun_off: Whether the gun stays closed, whatever `trigger` says.
+            gun_off: Whether the gun stays closed, whatever the `trigger`.
 
         Raises:
             BusError: The bus has ended, or its drives are not enabled.
@@ -85,7 +85,9 @@ class CanopenArm(LeafSystem):
         super().__init__()
         report = bus.report()
         if report is None or report.feedback.bus_state != BusState.ENABLED:
-            raise BusError("the drives are not enabled.", code="PNT-CYCLE-009")
+            raise BusError(
+                "the drives are not enabled; bring them up first.", code="PNT-CYCLE-009"
+            )
         self._bus = bus
         self._clock = clock
         self._gun_off = gun_off
@@ -163,7 +165,7 @@ class CanopenArm(LeafSystem):
             else:
                 self._bus.stop(camera)
         except BusError:
-            # The next update finds out why, and the brain ends the cycle.
+            # The next update reads the cause, and the brain ends the cycle.
             return EventStatus.DidNothing()
         return EventStatus.Succeeded()
 

@@ -23,10 +23,10 @@ from perception.ground import FrozenValue
 
 @dataclass(frozen=True, eq=False)
 class CameraPicture(FrozenValue):
-    """The last picture and how the camera fares.
+    """The last picture and the state of the camera.
 
     Attributes:
-        frame: As the driver gave it; None before the first.
+        frame: From the driver; None before the first.
         time: When it was taken, by the diagram's clock, s; -1 = none yet.
         health: Of the camera.
     """
@@ -52,14 +52,14 @@ class RealsenseCamera(LeafSystem):
     Ports:
         depth_image: ImageDepth16U, mm, 0 = no return; the last picture, all 0 before
             the first.
-        color_image: ImageRgba8U, the last one, black where there is none.
+        color_image: ImageRgba8U, the last one; black if there is none.
         image_time: (1,) s, when the depth picture was taken, by the diagram's clock; -1
             before the first.
-        status: CameraStatus; names what is wrong with the camera.
+        status: CameraStatus; names the camera's fault.
 
     State is one CameraPicture, replaced every `period` s, first at t = 0, with the
-    newest that the reading thread has. A picture's age now, by this computer's clock,
-    gives its time by the diagram's: both run at the same rate.
+    newest of the reading thread. A picture's age by this computer's clock gives its
+    time by the diagram's: both run at the same rate.
     """
 
     def __init__(
@@ -76,14 +76,14 @@ class RealsenseCamera(LeafSystem):
         """Creates the system.
 
         Args:
-            read: Returns the newest of the camera without waiting; `CameraReader.read`.
+            read: Returns the newest reading without waiting; `CameraReader.read`.
             width: Of depth pictures, px.
             height: Of depth pictures, px.
-            color_width: Of colour pictures on the port, px; others are not shown.
+            color_width: Of colour pictures on the port, px; others are dropped.
             color_height: Of colour pictures on the port, px.
-            period: Time between looks for a new picture, s.
+            period: Time between checks for a new picture, s.
             diagram_time: Maps this computer's clock, s, to the diagram's, s; None takes
-                the diagram to be at now.
+                the diagram to be at the present time.
 
         Raises:
             ValueError: `period` is not a positive number.
@@ -164,8 +164,8 @@ class RealsenseCamera(LeafSystem):
                 taken = now - (time.monotonic() - reading.taken)
             else:
                 taken = self._diagram_time(reading.taken)
-            # Taken before the diagram's time began: not a picture of this run; or after
-            # where the diagram is: it will be in time at the next look.
+            # A picture from before the diagram's start is not of this run; one from
+            # after its present time is taken at the next check.
             if 0.0 <= taken <= now and taken > last.time:
                 picture = picture.replace(frame=reading.frame, time=taken)
         index = int(self._picture_index)

@@ -1,4 +1,4 @@
-"""How close the robot comes to anything else; simulation only."""
+"""Clearance of the robot from its surroundings; simulation only."""
 
 from pydrake.common.value import Value
 from pydrake.geometry import GeometryId, QueryObject, SignedDistancePair
@@ -6,7 +6,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 
 class ClearanceMonitor(LeafSystem):
-    """Measures the least distance between the robot and what is round it.
+    """Measures the least distance between the robot and its surroundings.
 
     .. pydrake_system::
 
@@ -19,7 +19,7 @@ class ClearanceMonitor(LeafSystem):
     Ports:
         query_object: QueryObject of the scene graph.
         clearance: (1,) m, from the robot to the surroundings; negative = penetration,
-            also of the robot with itself; `horizon` = nothing is nearer.
+            also of the robot into itself; `horizon` = nothing is nearer.
     """
 
     def __init__(
@@ -33,8 +33,8 @@ class ClearanceMonitor(LeafSystem):
 
         Args:
             robot: Collision geometries of the robot's moving bodies.
-            surroundings: Those of what it is to keep away from.
-            horizon: Distances beyond this are not looked at, m.
+            surroundings: Collision geometries from which it keeps clear.
+            horizon: Distances beyond this are not computed, m.
 
         Raises:
             ValueError: There is no geometry or the horizon is not positive.
@@ -57,12 +57,12 @@ class ClearanceMonitor(LeafSystem):
     def _CalcClearance(self, context: Context, output: BasicVector) -> None:
         query = self._query_port.Eval(context)
         pairs = query.ComputeSignedDistancePairwiseClosestPoints(self._horizon)
-        near = (pair.distance for pair in pairs if self._Counts(pair))
+        near = (pair.distance for pair in pairs if self._IsRelevant(pair))
         output.SetAtIndex(0, min(near, default=self._horizon))
 
-    def _Counts(self, pair: SignedDistancePair) -> bool:
+    def _IsRelevant(self, pair: SignedDistancePair) -> bool:
         ids = {pair.id_A, pair.id_B}
         if ids <= self._robot:
-            # Parts of the robot are near one another by design; they may not touch.
+            # The robot's own parts are close by design, but must not touch.
             return pair.distance < 0.0
         return bool(ids & self._robot) and bool(ids & self._surroundings)

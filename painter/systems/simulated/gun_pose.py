@@ -1,4 +1,4 @@
-"""Where the gun truly is; simulation only."""
+"""True pose of the gun; simulation only."""
 
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
@@ -8,7 +8,7 @@ from painter.planning.arm.kinematics import NQ, ArmKinematics
 
 
 class GunPose(LeafSystem):
-    """Gives the nozzle's pose from the joints.
+    """Computes the nozzle's pose from the joints.
 
     .. pydrake_system::
 

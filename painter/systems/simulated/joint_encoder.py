@@ -1,4 +1,4 @@
-"""The joint encoders and what the drives make of them; simulation only."""
+"""The joint encoders as the drives read them; simulation only."""
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
@@ -20,15 +20,15 @@ class JointEncoder(LeafSystem):
     Ports:
         state: (10,) true q, v; rad, rad/s.
         state_estimated: (10,) measured q, v; rad, rad/s. Position is rounded to whole
-            encoder counts, velocity to one count per `velocity_window`, as a drive
-            gives it that differentiates over that window.
+            encoder counts, velocity to one count per `velocity_window`, over which a
+            drive differentiates.
     """
 
     def __init__(self, *, bits: int, velocity_window: float = 0.01) -> None:
         """Creates the encoders.
 
         Args:
-            bits: Resolution, bits a turn of the joint.
+            bits: Resolution, bits per turn of the joint.
             velocity_window: Time over which a drive differentiates, s.
 
         Raises:

@@ -1,4 +1,4 @@
-"""The paint that has landed; simulation only."""
+"""The paint film on the scene; simulation only."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -18,14 +18,14 @@ from perception.settings import validate
 
 @dataclass(frozen=True, eq=False)
 class FilmState(FrozenValue):
-    """The film on the surface, and what the gun is doing.
+    """The film on the surface, and the state of the gun.
 
     Attributes:
         volume: (ny, nx) m³ of paint on each cell, row 0 at the lowest y of S.
         cell: Edge of a cell, m.
         origin: (2,) m, corner of the grid at its lowest x and y, in S.
         sprayed: Volume that left the gun, m³, before transfer efficiency.
-        missed: Volume that would have landed but met no surface, m³.
+        missed: Volume, after transfer efficiency, that met no surface, m³.
         X_SG: Nozzle pose at the last update, or None before the first.
         time: (k,) s, latest updates.
         dose: (k,) s, integral of the trigger up to each of them.
@@ -52,7 +52,7 @@ class FilmState(FrozenValue):
         sprayed: float = 0.0,
         missed: float = 0.0,
     ) -> Self:
-        """Makes a film before which the gun has not been yet; see the attributes."""
+        """Makes a film that the gun has not sprayed on yet; see the attributes."""
         return cls(
             volume=volume,
             cell=cell,
@@ -85,7 +85,7 @@ class FilmState(FrozenValue):
 
 
 class PaintFilm(LeafSystem):
-    """Lays paint on the scene's true surface as the gun moves over it.
+    """Deposits paint on the scene's true surface as the gun moves over it.
 
     .. pydrake_system::
 
@@ -103,8 +103,8 @@ class PaintFilm(LeafSystem):
 
     State is one FilmState, replaced every `period` s, first at t = 0. Paint is spread
     over the nozzle's motion since the last update. The flow follows the trigger after
-    the tip's valve delay, opening and closing; between updates the trigger is taken as
-    a straight line, which makes no paint and loses none on average.
+    the tip's valve delay, opening and closing; between updates the trigger is
+    interpolated linearly, which keeps the volume on average.
     """
 
     def __init__(
@@ -127,10 +127,10 @@ class PaintFilm(LeafSystem):
             X_WS: Pose of the surface's frame in W; S z towards the robot.
             tip: The spray tip.
             period: Time between updates, s.
-            before: What is there already, on the same grid; None = nothing.
+            before: Film that is there already, on the same grid; None = none.
 
         Raises:
-            ValueError: The surface, the tip or `period` cannot be, or `before` lies on
+            ValueError: The surface, the tip or `period` is invalid, or `before` lies on
                 another grid.
         """
         super().__init__()
@@ -150,9 +150,9 @@ class PaintFilm(LeafSystem):
         if before is not None:
             if not film.same_grid(before):
                 raise ValueError(
-                    f"film of {before.volume.shape} cells of {before.cell} m from "
-                    f"{before.origin} m cannot go on as one of {height.shape} cells of "
-                    f"{cell} m from {film.origin} m."
+                    f"before: {before.volume.shape} cells of {before.cell} m from "
+                    f"{before.origin} m must lie on the surface's grid: "
+                    f"{height.shape} cells of {cell} m from {film.origin} m."
                 )
             film = before
         self._film_index = self.DeclareAbstractState(Value(film))

@@ -1,4 +1,4 @@
-"""State of the simulated drives, with faults on demand; simulation only."""
+"""State of the simulated drives, with injected faults; simulation only."""
 
 from collections.abc import Sequence
 
@@ -32,7 +32,7 @@ class SimulatedDrives(LeafSystem):
         """Creates the drives.
 
         Args:
-            faults: (time s, joint 1-5, code) of each fault to inject; a fault stays.
+            faults: (time s, joint 1-5, code) of each fault to inject; faults last.
         """
         super().__init__()
         self._faults = tuple(faults)

@@ -21,15 +21,15 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.depth_camera.stereo import StereoModel
 from perception.ground import FrozenValue
 
-# How long paint mist hangs before the lens after the gun has closed, s (assumption).
+# Time that paint mist hangs before the lens after the gun closes, s (assumption).
 MIST_TIME = 2.0
 
 
 def render_camera_info(intrinsics: CameraIntrinsics) -> CameraInfo:
-    """Returns what makes Drake render pictures with these intrinsics.
+    """Returns the Drake camera that renders pictures with these intrinsics.
 
-    Drake's renderers count the principal point from the picture's corner, so half a
-    pixel more than from the first pixel's centre; a test measures it on a rendering.
+    Drake's renderers count the principal point from the picture's corner: half a pixel
+    more than from the first pixel's centre. A test measures it on a rendering.
 
     Args:
         intrinsics: Of the camera; (0, 0) is the centre of the upper left pixel.
@@ -52,7 +52,7 @@ class DepthPicture(FrozenValue):
         depth_mm: (H, W) uint16, mm, 0 = no return.
         time: When it was taken, s; -1 = none yet.
         number: Pictures taken so far.
-        spray_time: When the gun was last seen spraying, s.
+        spray_time: When the gun last sprayed, s.
     """
 
     depth_mm: npt.NDArray[np.uint16]
@@ -76,17 +76,17 @@ class StereoCamera(LeafSystem):
         - image_time
 
     Ports:
-        ideal_depth: ImageDepth32F, m, panes of glass left out; 0 = too near, inf = too
+        ideal_depth: ImageDepth32F, m, without panes of glass; 0 = too near, inf = too
             far.
         ideal_depth_with_glass: The same with the panes as solid bodies.
         gun_trigger: (1,); while the gun sprays and MIST_TIME after, the lens cover is
             shut and no picture is taken. May be left unconnected: always open.
         depth_image: ImageDepth16U, mm, 0 = no return; the last picture, all 0 before
             the first.
-        image_time: (1,) s, when that was taken; -1 before the first.
+        image_time: (1,) s, when it was taken; -1 before the first.
 
     State is one DepthPicture, replaced every 1 / `rate` s, first at t = 0. Noise is
-    drawn from the seed and the picture's number, so that a replay repeats it.
+    drawn from the seed and the picture's number: a replay repeats it.
     """
 
     def __init__(self, *, config: StereoConfig, seed: int, rate: float) -> None:

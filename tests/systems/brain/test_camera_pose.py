@@ -56,13 +56,13 @@ def test_pose_is_that_of_the_picture_not_of_now(image_time):
 
 
 def test_a_calibrated_mount_is_where_the_pose_is():
-    X_CCm = RigidTransform(RotationMatrix.MakeXRotation(0.01), [0.0, 0.002, 0.0])
-    dut = CameraPose(kinematics=ARM, X_CCm=X_CCm)
+    X_NC = RigidTransform(RotationMatrix.MakeXRotation(0.01), [0.0, 0.002, 0.0])
+    dut = CameraPose(kinematics=ARM, X_NC=X_NC)
     context = dut.CreateDefaultContext()
     dut.GetInputPort("state").FixValue(context, np.zeros(10))
     dut.GetInputPort("image_time").FixValue(context, [-1.0])
     X_WC = dut.GetOutputPort("X_WC").Eval(context)
-    assert X_WC.IsNearlyEqualTo(yaw_pose(0.0) @ X_CCm, 1e-12)
+    assert X_WC.IsNearlyEqualTo(yaw_pose(0.0) @ X_NC, 1e-12)
 
 
 def test_before_the_first_picture_the_pose_is_now():
@@ -82,7 +82,9 @@ def test_first_moment_has_a_pose_before_any_event():
 def test_pictures_out_of_the_history_are_an_error(image_time, age):
     simulator = make_simulator(image_time)
     simulator.AdvanceTo(2.0)
-    with pytest.raises(ImageTimeError, match=f"camera_pose: .*{age}.* reach back 1.0"):
+    with pytest.raises(
+        ImageTimeError, match=f"camera_pose: .*{age}.* oldest joint positions 1.0"
+    ):
         pose(simulator)
 
 
