@@ -177,7 +177,7 @@ def is_number(item):
     return item.kind in (int, float) or item.kind == list[float]
 
 
-@pytest.mark.parametrize("item", describe(Scenario), ids=lambda item: item.path)
+@pytest.mark.parametrize("item", list(describe(Scenario)), ids=lambda item: item.path)
 def test_every_setting_is_described_with_unit_and_bounds(item):
     assert item.text.endswith(".")
     # The unit stands in the metadata alone.
