@@ -1,4 +1,4 @@
-"""The robot's depth camera through librealsense, its clock, and what if it goes.
+"""The real depth camera through librealsense: driver, clock, reconnection.
 
 No Drake; pictures leave as NumPy arrays.
 """

@@ -1,32 +1,31 @@
-"""A camera's clock and this computer's: what the one shows when the other does."""
+"""Clock of a camera against the clock of this computer."""
 
 from collections import deque
 
-# Pictures over which the offset is estimated: short enough that clocks that drift by
-# 100 ppm part by less than 1 ms over it at 30 Hz, long enough to hold one that was not
-# held up on its way.
+# Pictures over which the offset is estimated: few enough that a drift of 100 ppm stays
+# below 1 ms at 30 Hz, enough that one of them arrives without delay.
 _WINDOW = 200
-# A clock that goes back by more than this has been set anew, s; by less, a picture is
-# repeated. (One that goes ahead gives a lesser offset, which counts at once.)
+# A clock that steps back by more than this was set, s; by less, the picture is a
+# repeat. (A clock that steps forward gives a smaller offset, which applies at once.)
 _JUMP = 1.0
 
 
 class CameraClock:
     """Maps times of a camera's clock to this computer's monotonic clock.
 
-    A picture arrives late by what transfer and scheduling take, never early. So the
-    least difference of arrival and camera time over the last pictures is the offset of
-    the clocks plus the least latency, which is a constant of camera and computer.
+    Transfer and scheduling delay a picture and never advance it. So the minimum
+    difference of arrival and camera time over the last pictures is the offset of the
+    clocks plus the minimum latency, which is a constant of camera and computer.
 
     Source: Ridoux and Veitch, "Principles of robust timing over the Internet", 2010
     (minimum filtering of delays).
     """
 
     def __init__(self, latency: float) -> None:
-        """Creates a clock that knows nothing yet.
+        """Creates a clock without pictures.
 
         Args:
-            latency: Least time from exposure to arrival, s.
+            latency: Minimum time from exposure to arrival, s.
         """
         self._latency = latency
         self._offsets: deque[float] = deque(maxlen=_WINDOW)
@@ -41,8 +40,8 @@ class CameraClock:
             arrival: When it arrived, by this computer's, s.
 
         Returns:
-            The time, s; later than all before it and not after `arrival`. None for a
-            picture that is not newer than the one before, such as a repeated one.
+            The time, s; after all earlier ones and not after `arrival`. None for a
+            picture that is not newer than the last one, such as a repeat.
         """
         if self._last_camera is not None and camera_time <= self._last_camera:
             if camera_time > self._last_camera - _JUMP:

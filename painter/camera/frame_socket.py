@@ -22,7 +22,7 @@ _RECEIVE_TIME = 2.0
 
 
 class FrameServer:
-    """Sends pictures to all who are connected."""
+    """Sends pictures to all clients."""
 
     def __init__(self, path: str) -> None:
         """Listens.
@@ -45,7 +45,7 @@ class FrameServer:
         self._clients: list[socket.socket] = []
 
     def send(self, depth_mm: DepthArray, color: ColorArray | None, when: float) -> None:
-        """Sends a picture; who does not read is disconnected.
+        """Sends a picture; disconnects clients that do not read.
 
         Args:
             depth_mm: (H, W) uint16, mm.
@@ -69,7 +69,7 @@ class FrameServer:
                 client.close()
 
     def close(self) -> None:
-        """Disconnects all and removes the socket."""
+        """Disconnects all clients and removes the socket."""
         for client in self._clients:
             client.close()
         self._listener.close()
@@ -80,19 +80,19 @@ class FrameServer:
 class FrameClient:
     """Pictures of a `FrameServer`; a `FrameSource`.
 
-    Every picture is handed on when it is `latency` old, as those of a camera are, so
-    that what took long to render comes no later than the rest.
+    It returns every picture at the age of `latency`, like a camera, so that a slow
+    rendering is no later than the others.
     """
 
     def __init__(
         self, path: str, *, latency: float, clock: TimeBase | None = None
     ) -> None:
-        """Names the server; it is connected to when a picture is asked for.
+        """Creates the client; it connects when the first picture is requested.
 
         Args:
             path: Of the server's socket.
-            latency: Age at which pictures are handed on, s.
-            clock: The run's, by which pictures are stamped; None = the machine's.
+            latency: Age at which pictures are returned, s.
+            clock: Of the run, for the time stamps of pictures; None = the machine's.
         """
         self._clock = clock or TimeBase()
         self._path = path
@@ -149,6 +149,6 @@ class FrameClient:
         while got < size:
             count = self._socket.recv_into(view[got:])
             if count == 0:
-                raise ConnectionResetError(104, "the other side closed")
+                raise ConnectionResetError(104, "the peer closed the connection")
             got += count
         return data

@@ -1,4 +1,4 @@
-"""Pictures of a depth camera, and where they come from when it is not a device."""
+"""Pictures of a depth camera, and sources that replace the device."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,16 +13,16 @@ ColorArray = npt.NDArray[np.uint8]
 
 
 class CameraError(PainterError):
-    """The camera is not there, was unplugged, or does not do what it should."""
+    """The camera is missing, was unplugged, or does not work as configured."""
 
 
 @dataclass(frozen=True, eq=False)
 class CameraFrame:
-    """One picture as the camera's driver gives it.
+    """One picture from the driver of the camera.
 
     Attributes:
         depth_mm: (H, W) uint16, mm along C's z, 0 = no return.
-        color: (H, W, 3) uint8, RGB; None where there is none.
+        color: (H, W, 3) uint8, RGB; None without colour.
         time: When it was taken, by the camera's own clock, s.
         number: The driver's count of pictures.
     """
@@ -34,7 +34,7 @@ class CameraFrame:
 
 
 class FrameSource(Protocol):
-    """Rendered or recorded pictures, which stand for a device's imagers."""
+    """Rendered or recorded pictures in place of the imagers of a device."""
 
     def wait_frame(
         self, timeout: float
@@ -48,7 +48,7 @@ class FrameSource(Protocol):
             The picture, or None if none came in time.
 
         Raises:
-            CameraError: The source is gone, as a device that was unplugged.
+            CameraError: The source is lost, like an unplugged device.
         """
 
 
@@ -59,8 +59,8 @@ class Camera(Protocol):
         """Returns the next picture; None if none came within `timeout` s.
 
         Raises:
-            CameraError: The camera is gone.
+            CameraError: The camera is lost.
         """
 
     def close(self) -> None:
-        """Lets the camera go."""
+        """Releases the camera."""

@@ -1,4 +1,4 @@
-"""Reads a camera in a thread of its own: the newest picture, and how it fares."""
+"""Reads a camera in a thread of its own: newest picture, health, reconnection."""
 
 import enum
 import importlib.util
@@ -20,26 +20,26 @@ _WAIT = 0.1
 
 
 class CameraState(enum.StrEnum):
-    """What the camera does."""
+    """State of the camera."""
 
     STARTING = "starting"
     STREAMING = "streaming"
-    MISSING = "missing"  # It is being opened again.
-    LOST = "lost"  # All tries have failed; nothing more is tried.
+    MISSING = "missing"  # The reader tries to reopen it.
+    LOST = "lost"  # All tries have failed.
 
 
 @dataclass(frozen=True)
 class CameraHealth:
-    """How the camera fares since the reader began.
+    """State of the camera and counts since the reader began.
 
     Attributes:
-        state: What it does.
-        problem: Why no pictures come; empty while they do.
-        pictures: Pictures that were handed on.
-        repeated: Pictures dropped because they were not newer than the one before.
-        late: Pictures dropped because they were too old when they arrived.
-        skipped: Pictures that the camera took and this computer never saw.
-        reconnects: How often the camera was opened again.
+        state: Of the camera.
+        problem: Why no pictures arrive; empty while they do.
+        pictures: Pictures taken over.
+        repeated: Pictures dropped because they were not newer than the last one.
+        late: Pictures dropped because they were too old on arrival.
+        skipped: Pictures that the camera took and this computer never received.
+        reconnects: How often the camera was reopened.
     """
 
     state: CameraState = CameraState.STARTING
@@ -53,12 +53,12 @@ class CameraHealth:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """The newest of a camera.
+    """Newest picture of a camera.
 
     Attributes:
-        frame: Newest picture; None before the first.
+        frame: The picture; None before the first.
         taken: When it was taken, by the reader's clock, s.
-        health: How the camera fares.
+        health: Of the camera.
     """
 
     frame: CameraFrame | None = None
@@ -73,13 +73,13 @@ def camera_opener(
     baseline: float,
     source: FrameSource | None = None,
 ) -> Callable[[], Camera]:
-    """Returns a function that opens the camera that a scenario names.
+    """Returns a function that opens the camera of a scenario.
 
     Args:
-        config: The driver's settings.
-        wanted: Camera that the pictures are to be of.
-        baseline: Of its stereo imagers, m.
-        source: Feeds librealsense's software device instead of a camera, or None.
+        config: Settings of the driver.
+        wanted: Intrinsics of the returned pictures.
+        baseline: Of the stereo imagers, m.
+        source: Feeds librealsense's software device in place of a camera, or None.
 
     Raises:
         InputError: pyrealsense2 is not installed.
@@ -102,7 +102,7 @@ def camera_opener(
 
 
 class CameraReader:
-    """The reading thread; a context manager that lets the camera go at its end."""
+    """The reader thread; a context manager that releases the camera on exit."""
 
     def __init__(
         self,
@@ -113,9 +113,9 @@ class CameraReader:
         """Starts reading.
 
         Args:
-            open_camera: Opens the camera, as often as it is lost.
+            open_camera: Opens the camera, also after a loss.
             config: Latency, ages and tries.
-            clock: The run's; None = the machine's.
+            clock: Of the run; None = the machine's.
         """
         self._clock = clock or TimeBase()
         self._open_camera = open_camera
@@ -139,11 +139,11 @@ class CameraReader:
         self.close()
 
     def read(self) -> Reading:
-        """Returns the newest; never waits."""
+        """Returns the newest reading; never waits."""
         return self._reading  # One reference, replaced whole.
 
     def close(self) -> None:
-        """Ends the thread and lets the camera go."""
+        """Ends the thread and releases the camera."""
         self._end.set()
         self._thread.join()
 
@@ -160,21 +160,21 @@ class CameraReader:
             tries = 0 if self._reading.health.pictures > count else tries
             _LOGGER.warning("%s", problem)
             if tries >= config.retries:
-                self._tell(
+                self._set_health(
                     state=CameraState.LOST,
                     problem=f"{problem} Given up after {tries} tries.",
                 )
                 return
             tries += 1
-            self._tell(
+            self._set_health(
                 state=CameraState.MISSING,
-                problem=f"{problem} Try {tries} of {config.retries} follows.",
+                problem=f"{problem} Reopening, try {tries} of {config.retries}.",
                 reconnects=self._reading.health.reconnects + 1,
             )
             self._end.wait(config.retry_period)
 
     def _stream(self) -> None:
-        """Opens the camera and hands its pictures on; returns when asked to end."""
+        """Opens the camera and takes its pictures until the reader is closed."""
         camera = self._open_camera()
         clock, number = CameraClock(self._config.latency), None
         heard = self._clock.now()
@@ -216,6 +216,6 @@ class CameraReader:
             return
         self._reading = replace(self._reading, health=health)
 
-    def _tell(self, **changes: object) -> None:
+    def _set_health(self, **changes: object) -> None:
         health = replace(self._reading.health, **changes)  # type: ignore[arg-type]
         self._reading = replace(self._reading, health=health)

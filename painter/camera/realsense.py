@@ -1,7 +1,7 @@
 """librealsense: a device on USB, or a recording.
 
-Both, and the software device, are a librealsense device whose sensors are opened, set
-and filtered by the same code, so that tests without a camera run what the robot runs.
+Both, and the software device, are librealsense devices. The same code opens, configures
+and filters all three, so that tests without a camera run the robot's code.
 """
 
 import logging
@@ -28,7 +28,7 @@ def open_device(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSe
     """Opens a camera on USB.
 
     Raises:
-        CameraError: There is none, or not the one of that serial number.
+        CameraError: None is connected, or none with the serial number.
     """
     devices = list(rs.context().query_devices())
     serials = [device.get_info(rs.camera_info.serial_number) for device in devices]
@@ -39,7 +39,7 @@ def open_device(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSe
     if config.serial and config.serial not in serials:
         raise CameraError(
             f"camera: serial number {config.serial} is not connected; "
-            f"there are {', '.join(serials)}.",
+            f"connected are {', '.join(serials)}.",
             code="PNT-CAMERA-006",
         )
     number = serials.index(config.serial) if config.serial else 0
@@ -47,7 +47,7 @@ def open_device(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSe
 
 
 def open_recording(config: CameraDriverConfig, wanted: CameraIntrinsics) -> "RealSense":
-    """Opens a recording, played at the rate it was taken at.
+    """Opens a recording, played in real time.
 
     Raises:
         CameraError: It is missing, damaged, or has no depth.
@@ -73,16 +73,16 @@ class RealSense:
         self, device: Any, config: CameraDriverConfig, wanted: CameraIntrinsics, *,
         name: str,
     ) -> None:  # fmt: skip
-        """Sets the device and starts its streams.
+        """Configures the device and starts its streams.
 
         Args:
             device: A librealsense device.
             config: Preset, exposure, filters.
-            wanted: Camera that pictures are mapped to.
+            wanted: Intrinsics that pictures are mapped to.
             name: Of the device, in messages.
 
         Raises:
-            CameraError: It has no depth of the wanted size, or refuses a setting.
+            CameraError: It has no depth stream of this size, or rejects a setting.
         """
         self._device = device
         self._name = name
@@ -101,7 +101,7 @@ class RealSense:
             if config.color:
                 found = self._find_color(wanted)
                 if found is None:
-                    _LOGGER.info("camera %s has no colour of the wanted size.", name)
+                    _LOGGER.info("camera %s has no colour stream of this size.", name)
                 else:
                     self._start(*found, self._colors)
         except RuntimeError as error:
@@ -117,7 +117,7 @@ class RealSense:
         """Returns the next picture; None if none came within `timeout` s.
 
         Raises:
-            CameraError: The camera is gone.
+            CameraError: The camera is lost.
         """
         try:
             there, frame = self._depths.try_wait_for_frame(max(1, int(1e3 * timeout)))
@@ -125,7 +125,7 @@ class RealSense:
                 if self._device.is_playback() or self._device.is_connected():
                     return None
                 raise CameraError(
-                    f"camera {self._name}: it was unplugged.", code="PNT-CAMERA-010"
+                    f"camera {self._name}: was unplugged.", code="PNT-CAMERA-010"
                 )
             for step in self._filters:
                 frame = step.process(frame)
@@ -147,10 +147,10 @@ class RealSense:
         )
 
     def close(self) -> None:
-        """Stops the streams and lets the device go."""
+        """Stops the streams and releases the device."""
         while self._open:
             sensor = self._open.pop()
-            with suppress(RuntimeError):  # A device that was unplugged is stopped.
+            with suppress(RuntimeError):  # An unplugged device has stopped.
                 sensor.stop()
             with suppress(RuntimeError):
                 sensor.close()
@@ -163,7 +163,7 @@ class RealSense:
     def _find(
         self, stream: Any, form: Any, wanted: CameraIntrinsics
     ) -> tuple[Any, Any]:
-        """Returns the sensor and profile of a stream of the wanted size and rate."""
+        """Returns the sensor and profile of a stream of this size and rate."""
         offers = []
         for sensor in self._device.query_sensors():
             for profile in sensor.get_stream_profiles():
@@ -175,7 +175,7 @@ class RealSense:
                     return sensor, profile
         shown = ", ".join(sorted({f"{w} x {h} at {fps} Hz" for w, h, fps in offers}))
         raise CameraError(
-            f"camera {self._name}: no {stream.name} of {wanted.width} x "
+            f"camera {self._name}: no {stream.name} stream of {wanted.width} x "
             f"{wanted.height} at {self._config.fps} Hz; it has {shown or 'none'}.",
             code="PNT-CAMERA-012",
         )
@@ -188,7 +188,7 @@ class RealSense:
 
 
 def make_filters(config: CameraDriverConfig) -> list[Any]:
-    """Returns librealsense's filters in the order they run."""
+    """Returns librealsense's filters in their order of execution."""
     filters = [rs.threshold_filter(config.threshold_min, config.threshold_max)]
     middle = []
     if config.spatial:
@@ -215,11 +215,12 @@ def make_filters(config: CameraDriverConfig) -> list[Any]:
 def apply_options(sensor: Any, config: CameraDriverConfig) -> None:
     """Sets preset, exposure and emitter, reads back and compares.
 
-    The preset is first: it sets the others to its own. Options that a sensor does not
-    have, such as a recording's, are logged.
+    The preset comes first, since it changes the others. Options that a sensor lacks,
+    such as that of a recording, are logged.
 
     Raises:
-        CameraError: The sensor does not keep a value; names option and values.
+        CameraError: A value is out of range or reads back differently; names the option
+            and the values.
     """
     preset = int(getattr(rs.rs400_visual_preset, config.preset))
     values = [(rs.option.visual_preset, preset)]
@@ -250,7 +251,7 @@ def apply_options(sensor: Any, config: CameraDriverConfig) -> None:
 
 
 def _try_recording(path: str) -> None:
-    """Opens a recording in a process of its own: a damaged one may crash librealsense.
+    """Opens a recording in a separate process: a damaged one may crash librealsense.
 
     Raises:
         CameraError: It cannot be opened.
@@ -269,7 +270,7 @@ def _try_recording(path: str) -> None:
         )
     except subprocess.TimeoutExpired as error:
         raise CameraError(
-            f"camera: {path}: librealsense takes over {_TRY_TIME:g} s to open it.",
+            f"camera: {path}: librealsense did not open it within {_TRY_TIME:g} s.",
             code="PNT-CAMERA-015",
         ) from error
     if done.returncode != 0:

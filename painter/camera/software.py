@@ -26,16 +26,16 @@ class SoftwareCamera:
         *,
         baseline: float,
     ) -> None:
-        """Makes the device and opens it as one on USB would be.
+        """Creates the device and opens it like one on USB.
 
         Args:
-            source: Where pictures come from.
+            source: Source of pictures.
             config: Preset, exposure, filters.
-            wanted: Camera that the source's pictures are of.
+            wanted: Intrinsics of the source's pictures.
             baseline: Of the stereo imagers, m; the filters work in disparity.
 
         Raises:
-            CameraError: The device refuses a setting.
+            CameraError: The device rejects a setting.
         """
         self._source = source
         self._shape = (wanted.height, wanted.width)
@@ -64,10 +64,10 @@ class SoftwareCamera:
         self._camera = RealSense(self._device, config, wanted, name="software device")
 
     def wait(self, timeout: float) -> CameraFrame | None:
-        """Feeds the device with the source's next picture and returns what it makes.
+        """Feeds the next picture of the source to the device and returns its output.
 
         Raises:
-            CameraError: The source is gone, or its picture is not of the camera's size.
+            CameraError: The source is lost, or its picture has another size.
         """
         start = time.monotonic()
         found = self._source.wait_frame(timeout)
@@ -89,7 +89,8 @@ class SoftwareCamera:
     ) -> None:
         if pixels.shape[:2] != self._shape:
             raise CameraError(
-                f"camera source: a picture of {pixels.shape[:2]}, not {self._shape}.",
+                f"camera source: picture must be {self._shape} px (rows, columns), "
+                f"got {pixels.shape[:2]}.",
                 code="PNT-CAMERA-018",
             )
         frame = rs.software_video_frame()

@@ -117,7 +117,7 @@ def paint(strike, *, on_watch=lambda loop: None, interruption=lambda: None):
         )
     except ProgramKilledError:
         # What BusLoop does when the pipe of the diagram's side ends.
-        loop.bus.stop("the program that commands the arm is gone.")
+        loop.bus.stop("the program that commands the arm has ended.")
     loop.bus.wait_until(loop.bus.now() + 1.5)
     return loop, witness, log
 
@@ -279,7 +279,8 @@ def test_a_killed_diagram_while_painting():
     check_stop(loop, witness, knows_within=0.025, closes_within=CYCLE)
     assert log is None
     assert (
-        "the program that commands the arm is gone" in loop.bus.report().feedback.reason
+        "the program that commands the arm has ended"
+        in loop.bus.report().feedback.reason
     )
 
 

@@ -28,7 +28,7 @@ def test_pictures_arrive_whole_and_when_they_are_due(tmp_path):
     np.testing.assert_array_equal(got_depth, depth + 1)
     assert got_color is None
     server.close()
-    with pytest.raises(CameraError, match="the other side closed|No such file"):
+    with pytest.raises(CameraError, match="the peer closed|No such file"):
         dut.wait_frame(1.0)
 
 

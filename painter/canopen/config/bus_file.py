@@ -1,4 +1,4 @@
-"""Reads bus files, and refuses drives that cannot do what the file asks."""
+"""Reads bus files and checks that each drive supports what the file configures."""
 
 from pathlib import Path
 
@@ -21,13 +21,13 @@ def load_bus(path: Path) -> BusConfig:
         The bus, checked.
 
     Raises:
-        InputError: The file cannot be read, a field is unknown, missing or out of its
-            range, or a drive cannot do what the field asks; names file and field.
+        InputError: The file cannot be read, a field is unknown, missing or out of
+            range, or a drive does not support it; names file and field.
     """
     try:
         data = yaml.safe_load(path.read_text())
         if isinstance(data, dict) and "path" in data:
-            raise ValueError("path is unknown: it is set by the reader.")
+            raise ValueError("path is unknown: the reader sets it.")
         bus = read_typed(BusConfig, data)
         bus.path = str(path)
         bus.validate()
@@ -45,9 +45,9 @@ def load_bus(path: Path) -> BusConfig:
 
 
 def choose_mode(device: DeviceDescription) -> Mode | None:
-    """Returns the mode to stream positions in: CSP, else IP, else None.
+    """Returns the mode in which positions are streamed: CSP, else IP, else None.
 
-    A file without a value for 6502h counts as having what its objects allow.
+    A device description without a value for 6502h counts as supporting CSP.
     """
     modes = device.modes()
     if modes is None or Mode.CYCLIC_SYNC_POSITION in modes:
@@ -58,9 +58,9 @@ def choose_mode(device: DeviceDescription) -> Mode | None:
 
 
 def mode_problem(drive: DriveConfig, device: DeviceDescription) -> str | None:
-    """Returns why a drive with this description cannot be used so, or None.
+    """Returns why a device cannot be used as configured, or None.
 
-    The text begins with the field of the bus file that asks for it.
+    The text begins with the field of the bus file in question.
     """
     if choose_mode(device) is None:
         return f"eds: {device.source} has neither CSP nor IP mode (6502h)."
@@ -69,13 +69,13 @@ def mode_problem(drive: DriveConfig, device: DeviceDescription) -> str | None:
         if modes is not None and Mode.HOMING not in modes:
             return f"homing.kind: {device.source} has no homing mode (6502h)."
         if not device.is_writable(0x6098):
-            return f"homing.method: {device.source} has no 6098h that can be written."
+            return f"homing.method: {device.source} has no writable 6098h."
     for field, sub in (("vendor", 1), ("product", 2)):
         wanted = getattr(drive.identity, field)
         info = device.find(0x1018, sub)
         found = info.default if info else None
         if wanted and isinstance(found, int) and found and found != wanted:
-            return f"identity.{field} is {wanted:X}h, {device.source} says {found:X}h."
+            return f"identity.{field} is {wanted:X}h, {found:X}h in {device.source}."
     # Source: CiA 402-2 v4.0.0, 60A9h: unit in bits 16 to 23 (B4h revolutions), time
     # base in bits 8 to 15 (47h minute).
     info = device.find(0x60A9)
@@ -85,6 +85,6 @@ def mode_problem(drive: DriveConfig, device: DeviceDescription) -> str | None:
             unit = "rpm" if is_rpm else "not rpm"
             return (
                 f"velocity_unit is {drive.velocity_unit}, but 60A9h of "
-                f"{device.source} says {unit} ({info.default:08X}h)."
+                f"{device.source} is {info.default:08X}h, {unit}."
             )
     return None

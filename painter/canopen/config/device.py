@@ -1,4 +1,4 @@
-"""What a device has: object dictionaries from EDS and DCF files, or built in."""
+"""Device descriptions: object dictionaries from EDS and DCF files, or built in."""
 
 import enum
 import logging
@@ -17,7 +17,7 @@ _LOGGER = logging.getLogger(__name__)
 
 
 class Mode(enum.IntEnum):
-    """Modes of operation that are used here.
+    """Modes of operation in use.
 
     Source: CiA 402-2 v4.0.0, object 6060h; bit (value - 1) of 6502h.
     """
@@ -36,12 +36,12 @@ class ObjectInfo:
         index: Index, 0 to FFFFh.
         sub: Sub-index, 0 to FFh.
         name: Its name in the file.
-        data_type: How its value is encoded.
+        data_type: Encoding of its value.
         access: "ro", "wo", "rw" or "const".
-        default: Value after power-on; None where the file gives none.
-        low: Least value allowed; None where the file gives none.
-        high: Greatest value allowed; None likewise.
-        mappable: Whether a PDO may carry it.
+        default: Value after power-on; None if the file gives none.
+        low: Lower limit; None if the file gives none.
+        high: Upper limit; None if the file gives none.
+        mappable: Whether it may be mapped into a PDO.
     """
 
     index: int
@@ -56,7 +56,12 @@ class ObjectInfo:
 
 
 class DeviceDescription:
-    """The object dictionary that a device's maker describes."""
+    """The object dictionary of a device type.
+
+    Attributes:
+        source: Where it comes from, for messages.
+        objects: All entries, by index and sub-index.
+    """
 
     def __init__(self, source: str, objects: Iterable[ObjectInfo]) -> None:
         """Creates the description.
@@ -71,16 +76,16 @@ class DeviceDescription:
         }
 
     def find(self, index: int, sub: int = 0) -> ObjectInfo | None:
-        """Returns an entry, or None where the device has no such object."""
+        """Returns an entry, or None if the device has no such object."""
         return self.objects.get((index, sub))
 
     def is_writable(self, index: int, sub: int = 0) -> bool:
-        """Whether the entry is there and may be written."""
+        """Whether the entry exists and may be written."""
         info = self.find(index, sub)
         return info is not None and info.access in ("rw", "wo")
 
     def modes(self) -> frozenset[Mode] | None:
-        """Supported modes as 6502h says; None where the file gives no value."""
+        """Supported modes by 6502h; None if the file gives no value."""
         info = self.find(0x6502)
         if info is None or not isinstance(info.default, int):
             return None
@@ -93,11 +98,11 @@ def modes_of(supported: int) -> frozenset[Mode]:
 
 
 def read_device(path: Path, node_id: int) -> DeviceDescription:
-    """Reads an EDS or DCF; values of a DCF count before defaults.
+    """Reads an EDS or DCF; values of a DCF override defaults.
 
     Args:
         path: The file.
-        node_id: What `$NODEID` stands for.
+        node_id: Value of `$NODEID`.
 
     Returns:
         The description.
@@ -109,7 +114,7 @@ def read_device(path: Path, node_id: int) -> DeviceDescription:
         raise InputError(f"{path}: no such EDS or DCF file.", code="PNT-BUSFILE-004")
     try:
         dictionary = canopen.import_od(str(path), node_id=node_id)
-    except Exception as error:  # A parser of INI files raises what it likes.
+    except Exception as error:  # The INI parser raises many kinds.
         text = " ".join(str(error).split())
         raise InputError(
             f"{path}: not an EDS or DCF file: {text}", code="PNT-BUSFILE-005"
@@ -121,7 +126,7 @@ def read_device(path: Path, node_id: int) -> DeviceDescription:
             info = _info(variable)
             if info is None:
                 _LOGGER.warning(
-                    "%s: %04Xh:%d has data type %s, which is not known; left out.",
+                    "%s: %04Xh:%d has unknown data type %s; left out.",
                     path,
                     variable.index,
                     variable.subindex,
@@ -146,7 +151,7 @@ def _info(variable: Any) -> ObjectInfo | None:
         sub=variable.subindex,
         name=variable.name,
         data_type=DataType(variable.data_type),
-        # "rww" and "rwr" say which PDO may carry it; SDO access is "rw".
+        # "rww" and "rwr" restrict PDO mapping; SDO access is "rw".
         access="rw" if access.startswith("rw") else access,
         default=default,
         low=variable.min,

@@ -1,7 +1,7 @@
-"""Object dictionaries that are built in: a full CiA 402 drive, a CiA 401 I/O node.
+"""Built-in object dictionaries: a full CiA 402 drive, a CiA 401 I/O node.
 
 Source: CiA 301 v4.2.0, CiA 402-2 v4.0.0 and CiA 401-1 v3.1.0: index, type and access
-of each object. Defaults are our own choice where those leave it open.
+of each object. Defaults that they leave open are our choice.
 """
 
 from painter.canopen.config.device import DeviceDescription, ObjectInfo

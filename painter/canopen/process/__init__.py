@@ -1,4 +1,4 @@
 """The bus in a process of its own: loop, mailboxes, clocks.
 
-The only room that sets priorities or sleeps.
+The only room of the bus that sets priorities or sleeps.
 """

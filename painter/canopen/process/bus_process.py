@@ -1,10 +1,10 @@
-"""The bus in a process of its own, so that no computation holds up a SYNC.
+"""The bus in a process of its own, so that no computation delays a SYNC.
 
-`BusProcess` is the diagram's side: it never waits for the bus. Feedback comes through a
-mailbox in shared memory, commands and setpoints go through a pipe of which the bus
-takes what is there each cycle. When this side dies the pipe ends: the bus stops the
-arm, closes the gun and switches off. When the bus process dies the drives miss the
-master's heartbeat and stop by 6007h.
+`BusProcess` is the diagram's side; it never waits for the bus. Feedback arrives
+through a mailbox in shared memory; commands and setpoints go through a pipe that the
+bus empties each cycle. When this side dies, the pipe ends: the bus stops the arm,
+closes the gun and switches off. When the bus process dies, the drives miss the master's
+heartbeat and stop by 6007h.
 """
 
 import contextlib
@@ -48,12 +48,12 @@ _POINTS_AT_ONCE = 6
 
 @dataclass(frozen=True)
 class Report:
-    """What the bus process puts into its mailbox each cycle.
+    """Content of the mailbox, replaced each cycle.
 
     Attributes:
         feedback: State of the arm.
-        rejection: Why the last command was refused; empty if it was not.
-        lateness: How late cycles began; renewed every second.
+        rejection: Why the last command was rejected; empty if it was not.
+        lateness: How late cycles began; updated every second.
         is_fifo: Whether the loop runs under SCHED_FIFO.
     """
 
@@ -78,15 +78,15 @@ class BusLoop:
         """Connects to the bus.
 
         Args:
-            bus: What is on the bus.
-            commands: Where commands come from.
-            mailbox: Where reports go.
-            ring: Where measured samples go.
+            bus: The bus file.
+            commands: Source of commands.
+            mailbox: Takes the reports.
+            ring: Takes the measured joint states.
             log: Pipe of a `FrameLogger`, or None.
-            clock: The run's; None = the machine's.
+            clock: Of the run; None = the machine's.
 
         Raises:
-            PainterError: The transport cannot be opened, or an EDS not be used.
+            PainterError: The transport cannot be opened, or an EDS is unusable.
         """
         self._clock = clock or TimeBase()
         transport = open_transport(bus)
@@ -105,7 +105,7 @@ class BusLoop:
         self._end_at: float | None = None
 
     def run(self) -> None:
-        """Runs until the other side asks to end, or is gone, and the arm is off."""
+        """Runs until the other side ends it or dies, and the arm is switched off."""
         self._is_fifo = use_fifo()
         freeze_gc()
         lock_memory()
@@ -116,10 +116,10 @@ class BusLoop:
     def _cycle_until_ended(self) -> None:
         per_second = max(1, round(1.0 / self._ticker.period))
         count = 0
-        self._ticker.begin()  # Locking took a second.
+        self._ticker.begin()  # Locking memory took up to a second.
         while not self._has_ended():
             while (remaining := self._ticker.remaining()) > 0.0:
-                # Frames between two SYNCs are read at once: a fault need not wait.
+                # Frames between two SYNCs are read at once, so faults act at once.
                 now = self._clock.now()
                 again = max(0.0, self._clock.machine(self._master.io.repeat_at - now))
                 self._master.poll(now, min(remaining, again))
@@ -160,22 +160,22 @@ class BusLoop:
                     return
                 self._do(self._commands.recv())
         except (EOFError, OSError):
-            self._master.stop("the program that commands the arm is gone.")
+            self._master.stop("the program that commands the arm has ended.")
             self._end(_STOP_TIME)
 
     def _do(self, command: tuple[str, object]) -> None:
-        word, argument = command
+        name, argument = command
         try:
-            if word == "push":
+            if name == "push":
                 self._master.push(argument)  # type: ignore[arg-type]
-            elif word == "start":
+            elif name == "start":
                 self._master.start()
-            elif word == "stop":
+            elif name == "stop":
                 self._master.stop(str(argument))
-            elif word == "acknowledge":
+            elif name == "acknowledge":
                 self._rejection = ""
                 self._master.acknowledge()
-            elif word == "end":
+            elif name == "end":
                 self._end(0.0)
         except (BusError, ValueError) as error:
             self._rejection = str(error)
@@ -194,7 +194,7 @@ class BusLoop:
 
 
 class BusProcess:
-    """The diagram's side of the bus; a context manager that switches off at its end."""
+    """The diagram's side of the bus; a context manager that switches off on exit."""
 
     def __init__(
         self,
@@ -203,12 +203,12 @@ class BusProcess:
         log: Path | None = None,
         clock: TimeBase | None = None,
     ) -> None:
-        """Starts the process; the bus itself is begun by `start`.
+        """Starts the process; `start` brings the bus up.
 
         Args:
-            bus: What is on the bus.
-            log: Where to write all frames in candump's format, or None.
-            clock: The run's; None = the machine's.
+            bus: The bus file.
+            log: File that gets all frames in candump's format, or None.
+            clock: Of the run; None = the machine's.
 
         Raises:
             InputError: The log cannot be written.
@@ -264,49 +264,49 @@ class BusProcess:
         return self._process.is_alive()
 
     def start(self) -> None:
-        """Asks for bring-up; the feedback tells how it goes."""
+        """Commands bring-up; the feedback shows its progress."""
         self._send("start")
 
     def push(self, points: Sequence[Setpoint]) -> None:
         """Sends setpoints.
 
         Raises:
-            BusError: The bus process has ended or takes nothing any more.
+            BusError: The bus process has ended or takes no commands.
         """
         for i in range(0, len(points), _POINTS_AT_ONCE):
             self._send("push", list(points[i : i + _POINTS_AT_ONCE]))
 
     def stop(self, reason: str) -> None:
-        """Asks for a controlled stop."""
+        """Commands a controlled stop."""
         self._send("stop", reason)
 
     def acknowledge(self) -> None:
-        """Asks to begin again after a stop; a rejection is in the report."""
+        """Commands a restart after a stop; the report holds a rejection."""
         self._send("acknowledge")
 
     def report(self) -> Report | None:
         """Returns the newest report; None before the first one.
 
         Raises:
-            BusError: The bus process has ended; says why where it could.
+            BusError: The bus process has ended; gives the cause if known.
         """
         if not self._process.is_alive():
             raise BusError(
-                f"the bus process has ended: {self._last_words()}", code="PNT-BUS-019"
+                f"the bus process has ended: {self._exit_cause()}", code="PNT-BUS-019"
             )
         found = self._mailbox.get()
         return None if found is None else found[1]
 
     def samples(self, since: float) -> Samples:
-        """Returns what was measured after a time, s on the bus's clock."""
+        """Returns samples after a time, s on the clock of the bus."""
         return self._ring.since(since)
 
     def now(self) -> float:
-        """Returns the bus's clock, s."""
+        """Returns the clock of the bus, s."""
         return self.clock.now()
 
     def wait_until(self, when: float) -> None:
-        """Waits for a time, s, of the bus's clock."""
+        """Waits until a time, s, of the clock of the bus."""
         self.clock.sleep(when - self.clock.now())
 
     def close(self) -> None:
@@ -315,7 +315,7 @@ class BusProcess:
             self._send("end")
         self._process.join(self.clock.machine(_SWITCH_OFF_TIME + _STOP_TIME))
         if self._process.is_alive():
-            _LOGGER.error("the bus process did not end; killed.")
+            _LOGGER.error("the bus process did not end and was killed.")
             self._process.kill()
             self._process.join()
         self._commands.close()
@@ -324,22 +324,23 @@ class BusProcess:
         if self._logger is not None:
             self._logger.close()
 
-    def _send(self, word: str, argument: object = None) -> None:
-        # A pipe that can be written to has room for 4096 bytes (POSIX: PIPE_BUF), and
-        # no command is longer: this never waits.
+    def _send(self, name: str, argument: object = None) -> None:
+        # A writable pipe has room for 4096 bytes (POSIX: PIPE_BUF), and no command is
+        # longer: this never waits.
         _, ready, _ = select.select([], [self._commands], [], 0.0)
         if not ready:
             raise BusError(
-                "the bus process does not take commands any more.", code="PNT-BUS-020"
+                "the bus process takes no commands: its pipe is full.",
+                code="PNT-BUS-020",
             )
         try:
-            self._commands.send((word, argument))
+            self._commands.send((name, argument))
         except (BrokenPipeError, OSError) as error:
             raise BusError(
-                f"the bus process has ended: {self._last_words()}", code="PNT-BUS-021"
+                f"the bus process has ended: {self._exit_cause()}", code="PNT-BUS-021"
             ) from error
 
-    def _last_words(self) -> str:
+    def _exit_cause(self) -> str:
         with contextlib.suppress(EOFError, OSError):
             if self._errors.poll():
                 return str(self._errors.recv())
@@ -355,7 +356,7 @@ def _run(
     log: Connection | None,
     clock: TimeBase,
 ) -> None:
-    """The bus process: Ctrl-C is the parent's business, which then ends the pipe."""
+    """Runs the bus process; the parent handles Ctrl-C and then ends the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     mailbox, ring = Mailbox(name=mailbox_name), SampleRing(name=ring_name)
     try:

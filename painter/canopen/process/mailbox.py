@@ -1,12 +1,12 @@
-"""Newest value between two processes, without waiting: shared memory, two slots.
+"""Newest value between two processes, without locks: shared memory, two slots.
 
-One process writes, one reads. The writer fills the slot the reader is not told of and
-then raises the sequence number; the reader copies and looks whether the number is still
-the same. Neither waits for the other, and a process that dies leaves the other whole.
+One process writes, one reads. The writer fills the slot that is not current, then
+increments the sequence number; the reader copies the current slot and checks that the
+number is unchanged. Neither waits for the other or depends on its survival.
 
 Source: Lameter, "Effective synchronization on Linux/NUMA systems", 2005 (sequence
-locks); x86-64 and CPython keep the order of the stores used here, and a checksum tells
-a torn copy where a processor does not.
+locks); x86-64 and CPython keep the order of the stores used here, and a checksum
+detects a torn copy on other processors.
 """
 
 import pickle
@@ -21,14 +21,14 @@ _TRIES = 4
 
 
 class Mailbox:
-    """One value that a writer replaces and a reader looks at."""
+    """One value that a writer replaces and a reader reads."""
 
     def __init__(self, size: int = 16384, *, name: str | None = None) -> None:
         """Creates a mailbox, or opens one by name.
 
         Args:
-            size: Most bytes of a pickled value.
-            name: Name of an existing one; None creates it.
+            size: Maximum number of bytes of a pickled value.
+            name: Of an existing mailbox; None creates one.
         """
         self._size = size
         self._is_owner = name is None
@@ -46,14 +46,14 @@ class Mailbox:
 
     @property
     def sequence(self) -> int:
-        """How many values were put."""
+        """Number of values put so far."""
         return int(_HEAD.unpack_from(self._buffer, 0)[0])
 
     def put(self, value: Any) -> None:
         """Replaces the value.
 
         Raises:
-            ValueError: It is too long.
+            ValueError: The pickled value is too long.
         """
         data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         if len(data) > self._size:
@@ -66,9 +66,9 @@ class Mailbox:
         _HEAD.pack_into(self._buffer, 0, sequence)
 
     def get(self) -> tuple[int, Any] | None:
-        """Returns the newest value and its number.
+        """Returns the sequence number and the newest value.
 
-        None before the first value, and where it was replaced during each try.
+        None before the first value, or if it was replaced during each try.
         """
         for _ in range(_TRIES):
             sequence = self.sequence
@@ -83,7 +83,7 @@ class Mailbox:
         return None
 
     def close(self) -> None:
-        """Lets go; the owner also removes it."""
+        """Closes the memory; the owner also removes it."""
         del self._buffer
         self._memory.close()
         if self._is_owner:

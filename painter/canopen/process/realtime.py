@@ -1,4 +1,4 @@
-"""A loop with due times on the monotonic clock, and how late it was."""
+"""Real-time loop: due times on the monotonic clock, lateness, priorities."""
 
 import ctypes
 import gc
@@ -14,29 +14,29 @@ from painter.timebase import TimeBase
 
 _LOGGER = logging.getLogger(__name__)
 _PRIORITY = 60
-# The loop is awake so long before a tick: what has come is read, then the clock is
-# watched. It must cover waking up (0.05 to 0.15 ms) and the reading (0.1 to 0.2 ms);
+# The loop wakes up this long before a tick, s: it reads what was received, then spins
+# on the clock. It must cover waking up (0.05 to 0.15 ms) and reading (0.1 to 0.2 ms);
 # at 200 Hz it costs up to 10 % of a core.
 LEAD = 0.0005
 # Source: Linux, include/uapi/linux/mman.h and prctl.h.
 _MCL_CURRENT_AND_FUTURE = 3
 _PR_SET_TIMERSLACK = 29
-# Source: Linux, Documentation/power/pm_qos_interface.rst: an int32 of microseconds,
-# which counts for as long as the file is open.
+# Source: Linux, Documentation/power/pm_qos_interface.rst: an int32 of microseconds that
+# holds while the file is open.
 _WAKE_UP_LATENCY = "/dev/cpu_dma_latency"
 _KEPT = 12_000  # A minute at 200 Hz; sorting them takes less than a cycle.
 
 
 @dataclass(frozen=True)
 class Lateness:
-    """How late cycles began, s by the machine's clock.
+    """How late cycles began, s by the machine's clock, in the last minute.
 
     Attributes:
-        count: Cycles since the loop began; the rest is of the last minute.
+        count: Cycles since the loop began.
         p50: Median.
         p99: 99th percentile.
         p999: 99.9th percentile.
-        worst: Greatest.
+        worst: Maximum.
     """
 
     count: int
@@ -53,13 +53,13 @@ def use_fifo(priority: int = _PRIORITY) -> bool:
         priority: 1 to 99.
 
     Returns:
-        Whether it is; if not, a warning says so.
+        Whether it is; if not, logs a warning.
     """
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except (AttributeError, OSError) as error:
         _LOGGER.warning(
-            "no SCHED_FIFO (%s): expect cycles that are 5 ms late on a busy machine.",
+            "no SCHED_FIFO (%s): cycles may be 5 ms late on a busy machine.",
             error,
         )
         return False
@@ -68,18 +68,18 @@ def use_fifo(priority: int = _PRIORITY) -> bool:
 
 @contextmanager
 def stay_awake() -> Iterator[bool]:
-    """Keeps idle processors from sleeping so deep that they wake up late.
+    """Keeps idle processors out of sleep states that take long to wake up from.
 
-    On a robot's computer that is its C-states, in a virtual machine the halt after
-    which the host gives a core to others.
+    These are the C-states of a robot's computer; in a virtual machine, the halt after
+    which the host gives the core away.
 
     Yields:
-        Whether they are kept awake; if not, it is logged.
+        Whether that is allowed; if not, it is logged.
     """
     try:
         file = os.open(_WAKE_UP_LATENCY, os.O_WRONLY)
     except OSError as error:
-        _LOGGER.info("processors may sleep: %s", error)
+        _LOGGER.info("idle processors may sleep: %s", error)
         yield False
         return
     try:
@@ -90,7 +90,7 @@ def stay_awake() -> Iterator[bool]:
 
 
 def set_niceness(niceness: int) -> None:
-    """Puts this process, and those it starts, before others; where allowed.
+    """Raises the priority of this process and its children, where allowed.
 
     Args:
         niceness: -20 to -1.
@@ -102,14 +102,20 @@ def set_niceness(niceness: int) -> None:
 
 
 class Ticker:
-    """Due times, one a period; late ones are counted and skipped, never caught up."""
+    """Due times, one a period; missed ones are counted and skipped, never caught up.
+
+    Attributes:
+        period: Time between two ticks, s.
+        due: When the next tick is due, s.
+        overruns: Ticks skipped so far.
+    """
 
     def __init__(self, period: float, clock: TimeBase | None = None) -> None:
         """Creates a ticker whose first tick is due one period from now.
 
         Args:
             period: Time between two ticks, s.
-            clock: Counts it; None = the machine's.
+            clock: Of the run; None = the machine's.
         """
         self.period = period
         self._clock = clock or TimeBase()
@@ -123,15 +129,14 @@ class Ticker:
         self.due = self._clock.now() + self.period
 
     def remaining(self) -> float:
-        """Time of the machine until `LEAD` before the next tick, s; not negative."""
+        """Machine time until `LEAD` before the next tick, s; not negative."""
         return max(0.0, self._clock.machine(self.due - self._clock.now()) - LEAD)
 
     def tick(self) -> tuple[float, int]:
-        """Ends the wait for a tick that is due at once or in `LEAD`.
+        """Takes the next tick, which is due now or within `LEAD`.
 
         Returns:
-            When it was due, s, and how many ticks were skipped before it because their
-            time had passed too.
+            When it is due, s, and how many ticks before it were missed.
         """
         late = self._clock.now() - self.due
         skipped = int(late // self.period) if late > 0.0 else 0
@@ -141,7 +146,7 @@ class Ticker:
         return due, skipped
 
     def wait_until_due(self) -> None:
-        """Watches the clock until the last tick is due, and notes how late that is."""
+        """Spins until the taken tick is due, and records the lateness."""
         due = self.due - self.period
         while (late := self._clock.now() - due) < 0.0:
             pass
@@ -149,22 +154,22 @@ class Ticker:
         self._count += 1
 
     def lateness(self) -> Lateness:
-        """Returns how late the last ticks were."""
+        """Returns the lateness of the last ticks."""
         late = self._late[: max(1, min(self._count, _KEPT))]
         p50, p99, p999 = (float(p) for p in np.percentile(late, (50, 99, 99.9)))
         return Lateness(self._count, p50, p99, p999, float(late.max()))
 
 
 def freeze_gc() -> None:
-    """Leaves what was imported out of garbage collection, which takes 20 ms."""
+    """Excludes all present objects from garbage collection, which took 20 ms."""
     gc.collect()
     gc.freeze()
 
 
 def lock_memory() -> bool:
-    """Keeps this process's pages in memory and its timers sharp, where allowed.
+    """Locks the pages of this process and sets its timer slack to 1 ns, where allowed.
 
-    For a process of its own: all that it has and will have is locked.
+    Only for a process of its own: locks all present and future pages.
 
     Returns:
         Whether the pages are locked; if not, it is logged.

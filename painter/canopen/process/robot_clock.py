@@ -1,4 +1,4 @@
-"""The diagram's time and the bus's clock."""
+"""Time of the diagram against the clock of the bus."""
 
 import math
 from typing import Protocol
@@ -9,49 +9,49 @@ from painter.canopen.process.sample_ring import Samples
 
 
 class Bus(Protocol):
-    """The bus as the diagram sees it: in another process, or in simulated time."""
+    """The diagram's interface to the bus, in another process or in simulated time."""
 
     def start(self) -> None:
-        """Asks for bring-up; the report tells how it goes."""
+        """Commands bring-up; the report shows its progress."""
 
     def push(self, points: list[Setpoint]) -> None:
-        """Sends setpoints; raises BusError if nobody takes them any more."""
+        """Sends setpoints; raises BusError if the bus has ended."""
 
     def stop(self, reason: str) -> None:
-        """Asks for a controlled stop; the gun closes at once."""
+        """Commands a controlled stop; the gun closes at once."""
 
     def report(self) -> Report | None:
         """Returns the newest report; raises BusError if the bus has ended."""
 
     def samples(self, since: float) -> Samples:
-        """Returns what was measured after a time, s on the bus's clock."""
+        """Returns samples after a time, s on the clock of the bus."""
 
     def now(self) -> float:
-        """Returns the bus's clock, s."""
+        """Returns the clock of the bus, s."""
 
     def wait_until(self, when: float) -> None:
-        """Waits for a time, s, of the bus's clock."""
+        """Waits until a time, s, of the clock of the bus."""
 
     def close(self) -> None:
         """Switches the arm off."""
 
 
 class RobotClock:
-    """Maps the diagram's time to the bus's clock, on which everything else runs.
+    """Maps the diagram's time to the clock of the bus, which drives all else.
 
-    Both run at the same rate. The diagram is a little late on purpose, so that what was
-    measured at its present is there already; and its commands are carried out a little
-    later, so that no computation, which holds the diagram up, holds up the arm. While
-    the arm stands the diagram's clock may be stopped: a segmentation of two seconds
-    takes none of the robot's time.
+    Both run at the same rate. The diagram runs slightly late, so that the measurements
+    of its present have already arrived; its commands are executed slightly later, so
+    that a computation that delays the diagram does not delay the arm. While the arm is
+    at rest the diagram's clock may be stopped: a segmentation of two seconds then takes
+    no motion time.
 
     Attributes:
-        lag: By how much the diagram is behind the clock when nothing holds it up, s.
+        lag: Delay of the diagram behind the clock, s, when nothing delays it further.
         ahead: From a command's time in the diagram to its execution, s.
     """
 
     def __init__(self, *, lag: float = 0.02, ahead: float = 0.3) -> None:
-        """Creates a clock that does not run yet.
+        """Creates a clock that has not started.
 
         Args:
             lag: See the class, s.
@@ -70,21 +70,21 @@ class RobotClock:
 
     @property
     def stops(self) -> list[tuple[float, float]]:
-        """Times of the diagram, s, and the bus's clock less the diagram's from then."""
+        """Times of the diagram, s, and the bus clock's offset from then on, s."""
         return list(self._offsets)
 
     def start(self, now: float) -> None:
-        """Lets the diagram's time 0 be now, s on the bus's clock."""
+        """Starts the diagram's time at `now`, s on the clock of the bus."""
         self._offsets = [(0.0, now)]
 
     def bus_time(self, time: float) -> float:
-        """Returns the bus's clock, s, at a time, s, of the diagram's present."""
+        """Returns the clock of the bus, s, at the diagram's present time, s."""
         return time + self._offsets[-1][1]
 
     def diagram_time(self, bus_time: float) -> float:
-        """Returns the diagram's time, s, of a moment on the bus's clock, s.
+        """Returns the diagram's time, s, at a time on the clock of the bus, s.
 
-        All moments at which the diagram's clock stood still are one time of it.
+        All times at which the diagram's clock was stopped map to one time.
         """
         after = math.inf
         for start, offset in reversed(self._offsets):
@@ -94,9 +94,9 @@ class RobotClock:
         return min(bus_time - offset, after)
 
     def picture_time(self, bus_time: float) -> float:
-        """Returns `diagram_time`, s; NaN for a moment at which that clock stood still.
+        """Returns `diagram_time`, s; NaN if that clock was stopped then.
 
-        The arm still carried out commands then: it was nowhere that the diagram knows.
+        The arm still executed commands then, so the diagram has no pose for it.
         """
         time = self.diagram_time(bus_time)
         offsets = (offset for start, offset in reversed(self._offsets) if start <= time)
@@ -105,19 +105,19 @@ class RobotClock:
         )
 
     def due(self, time: float) -> float:
-        """Returns when the diagram may come to a time, s, on the bus's clock, s."""
+        """Returns when the diagram may reach a time, s; s by the bus's clock."""
         return self.bus_time(time) + self.lag
 
     def execution(self, time: float) -> float:
-        """Returns when a command of a time, s, is carried out, s, by the bus's."""
+        """Returns when a command of a time, s, is executed, s by the bus's clock."""
         return self.bus_time(time) + self.ahead
 
     def hold(self, time: float, now: float) -> float:
-        """Stops the diagram's clock for as long as it is behind; returns that, s.
+        """Stops the diagram's clock for the time by which it is behind; returns it, s.
 
         Args:
             time: Of the diagram, s.
-            now: On the bus's clock, s.
+            now: By the clock of the bus, s.
         """
         behind = now - self.due(time)
         if behind > 0.0:

@@ -1,4 +1,4 @@
-"""CANopen and CiA 402 as standards: frames, types, states, SDO, PDO maps, codes.
+"""The standards CANopen and CiA 402: frames, types, NMT, states, SDO, PDO maps, codes.
 
-No device, no file, no time.
+Holds no device, file or clock.
 """

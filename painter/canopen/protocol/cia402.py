@@ -60,11 +60,11 @@ class Command(enum.IntEnum):
     FAULT_RESET = 0x80
 
 
-# Controlword bits that the modes use.
+# Controlword bits whose sense depends on the mode.
 CONTROL_MODE_4 = 1 << 4  # PP: new set-point; HM: start; IP: enable interpolation.
 CONTROL_HALT = 1 << 8
 
-# Transitions 2 to 14 and 16 by command, and 0, 1, 13 that the drive takes by itself.
+# Transitions on command: 2 to 12, 15 and 16. The drive makes 0, 1, 13, 14 by itself.
 TRANSITIONS: dict[tuple[State, Command], tuple[int, State]] = {
     (State.SWITCH_ON_DISABLED, Command.SHUTDOWN): (2, State.READY),
     (State.READY, Command.SWITCH_ON): (3, State.SWITCHED_ON),
@@ -82,12 +82,12 @@ TRANSITIONS: dict[tuple[State, Command], tuple[int, State]] = {
     (State.FAULT, Command.FAULT_RESET): (15, State.SWITCH_ON_DISABLED),
     (State.QUICK_STOP, Command.ENABLE_OPERATION): (16, State.ENABLED),
 }
-# Leaving quick stop upwards is allowed only while the axis is held: 605Ah is 5 to 8.
+# Transition 16 requires that the axis is held: 605Ah is 5 to 8.
 HOLDING_QUICK_STOP = frozenset({5, 6, 7, 8})
 
 
 def state_of(statusword: int) -> State | None:
-    """Returns the state that a statusword shows; None if it shows none."""
+    """Returns the state in a statusword; None if its bits match none."""
     for state, (mask, value) in STATUS_CODES.items():
         if statusword & mask == value:
             return state
@@ -95,11 +95,11 @@ def state_of(statusword: int) -> State | None:
 
 
 def command_of(controlword: int, previous: int = 0) -> Command | None:
-    """Returns the command that a controlword gives; None if it gives none.
+    """Returns the command in a controlword; None if it holds none.
 
     Args:
-        controlword: The new value of 6040h.
-        previous: The value before: fault reset is the rising edge of bit 7.
+        controlword: New value of 6040h.
+        previous: Previous value: fault reset is the rising edge of bit 7.
     """
     if controlword & 0x80:
         return None if previous & 0x80 else Command.FAULT_RESET
@@ -115,8 +115,8 @@ def command_of(controlword: int, previous: int = 0) -> Command | None:
 def next_command(state: State) -> Command | None:
     """Returns the command of the next step up to OPERATION ENABLED.
 
-    None where there is nothing to command: the drive is there, or moves on by itself.
-    A drive in FAULT gets the fault reset, whose edge the caller makes.
+    None if the drive is there already, or leaves the state by itself. In FAULT it is
+    the fault reset; the caller makes its rising edge.
     """
     return {
         State.SWITCH_ON_DISABLED: Command.SHUTDOWN,
@@ -130,7 +130,7 @@ def next_command(state: State) -> Command | None:
 class QuickStopOption(enum.IntEnum):
     """Object 605Ah: what the quick stop command does.
 
-    1 to 4 pass on to SWITCH ON DISABLED when the axis stands (transition 12), 5 to 8
+    1 to 4 go to SWITCH ON DISABLED when the axis has stopped (transition 12), 5 to 8
     stay in QUICK STOP ACTIVE and hold the axis.
     """
 

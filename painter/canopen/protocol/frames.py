@@ -1,4 +1,4 @@
-"""CAN frames as values, CANopen's identifiers, and the time a frame takes.
+"""CAN frames as values, identifiers of CANopen, transmission time of a frame.
 
 Source: CiA 301 v4.2.0, 7.3.5 (pre-defined connection set); ISO 11898-1, 10.4 (frame
 format) and 10.5 (bit stuffing).
@@ -27,7 +27,7 @@ class Frame:
     Attributes:
         cob_id: Identifier, 0 to 7FFh; of an error frame, its class bits.
         data: Up to eight bytes.
-        is_error: True for an error frame made by the controller's driver.
+        is_error: Whether the CAN driver made it to report an error.
     """
 
     cob_id: int
@@ -36,7 +36,7 @@ class Frame:
 
 
 def frame_bits(length: int) -> int:
-    """Returns the most bits a frame with `length` data bytes takes on the wire.
+    """Returns the maximum number of bits of a frame with `length` data bytes.
 
     Classical frame with 11-bit identifier and interframe space, 47 + 8 n bits, and the
     most stuff bits that the 34 + 8 n stuffed bits can need.
@@ -49,5 +49,5 @@ def frame_bits(length: int) -> int:
 
 
 def frame_time(length: int, bitrate: int) -> float:
-    """Returns the longest time, s, of a frame with `length` data bytes at `bitrate`."""
+    """Returns the maximum time, s, of a frame with `length` data bytes at `bitrate`."""
     return frame_bits(length) / bitrate

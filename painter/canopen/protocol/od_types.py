@@ -1,4 +1,4 @@
-"""CANopen's basic data types: to bytes and back, with their bounds.
+"""Basic data types of CANopen: encoding and bounds.
 
 Source: CiA 301 v4.2.0, 7.1.6 (encoding) and table 44 (codes).
 """
@@ -8,7 +8,7 @@ import struct
 
 
 class DataType(enum.IntEnum):
-    """Data types that drives and I/O nodes use in the objects touched here."""
+    """Data types of the objects that drives and I/O nodes have."""
 
     BOOLEAN = 0x01
     INTEGER8 = 0x02
@@ -51,10 +51,10 @@ def size_of(data_type: DataType) -> int | None:
 
 
 def bounds(data_type: DataType) -> tuple[int, int]:
-    """Returns the least and greatest value of an integer type.
+    """Returns the minimum and maximum of an integer type.
 
     Raises:
-        ValueError: It is not an integer type.
+        ValueError: The type is not an integer type.
     """
     size = size_of(data_type)
     if size is None or data_type in (DataType.REAL32, DataType.REAL64):
@@ -68,7 +68,7 @@ def bounds(data_type: DataType) -> tuple[int, int]:
 
 
 def pack(data_type: DataType, value: Value) -> bytes:
-    """Returns the value as CANopen sends it, little endian.
+    """Encodes a value, little endian.
 
     Raises:
         ValueError: The value does not fit the type; names both.
@@ -85,10 +85,10 @@ def pack(data_type: DataType, value: Value) -> bytes:
 
 
 def unpack(data_type: DataType, data: bytes) -> Value:
-    """Returns the value of bytes as CANopen sends them.
+    """Decodes a value.
 
     Raises:
-        ValueError: There are too few or too many bytes; names both lengths.
+        ValueError: The number of bytes does not fit the type; names both lengths.
     """
     layout = _FORMATS.get(data_type)
     if layout is None:

@@ -1,4 +1,4 @@
-"""Which objects a process data object carries, learnt from what is written by SDO.
+"""PDO mappings, collected from SDO writes.
 
 Source: CiA 301 v4.2.0, 7.5.2.35 to 7.5.2.38 (1400h, 1600h, 1800h, 1A00h).
 """
@@ -13,9 +13,9 @@ class PdoMap:
     """One process data object.
 
     Attributes:
-        node_id: Whose it is.
-        is_received: True for an RPDO: the node receives it.
-        objects: Index, sub-index and bytes of what it carries.
+        node_id: Node that sends or receives it.
+        is_received: Whether the node receives it (RPDO).
+        objects: Index, sub-index and bytes of the mapped objects.
     """
 
     node_id: int
@@ -24,7 +24,7 @@ class PdoMap:
 
     @property
     def size(self) -> int:
-        """Bytes that are mapped."""
+        """Number of mapped bytes."""
         return sum(size for _, _, size in self.objects)
 
 
@@ -32,18 +32,18 @@ class PdoMaps:
     """All process data objects of a bus, by identifier."""
 
     def __init__(self) -> None:
-        """Knows of none."""
+        """Starts without mappings."""
         self._values: dict[tuple[int, int, int], int] = {}
         self._found: dict[int, PdoMap] | None = {}
 
     def write(self, node_id: int, index: int, sub: int, value: int) -> None:
-        """Takes note of a write; only to PDO parameters and mappings counts."""
+        """Takes a write; ignores objects other than PDO parameters and mappings."""
         if 0x1400 <= index < 0x1C00:
             self._values[node_id, index, sub] = value
             self._found = None
 
     def find(self, cob_id: int) -> PdoMap | None:
-        """Returns the PDO that has an identifier, or None."""
+        """Returns the PDO with an identifier, or None."""
         if self._found is None:
             self._found = dict(self._all())
         return self._found.get(cob_id)

@@ -1,4 +1,4 @@
-"""Simulated CANopen nodes that behave like real ones, down to their faults.
+"""Simulated CANopen nodes that behave like real ones, including their faults.
 
-Stands in for the robot; the master does not know this room.
+Replaces the robot; the master never imports this room.
 """

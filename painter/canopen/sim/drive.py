@@ -1,10 +1,10 @@
 """A simulated CiA 402 drive: state machine, brake, modes, limits, following error.
 
-Source: CiA 402-2 v4.0.0; clauses and objects are named where they count.
+Source: CiA 402-2 v4.0.0; clauses and objects are named at their code.
 """
 
 from painter.canopen.config.device import DeviceDescription, Mode, modes_of
-from painter.canopen.config.units import AccelerationUnit, AxisUnits, VelocityUnit
+from painter.canopen.config.units import AxisUnits, VelocityUnit
 from painter.canopen.protocol.cia402 import (
     CONTROL_HALT,
     CONTROL_MODE_4,
@@ -32,7 +32,17 @@ _GENERIC, _COMMUNICATION, _PROFILE = 0x01, 0x10, 0x20
 
 
 class SimDrive(SimNode):
-    """One drive with its motor."""
+    """One drive with its motor.
+
+    Attributes:
+        motor: What the position loop moves.
+        state: State of the power state machine.
+        demand: Output of the trajectory generator.
+        brake_time: Time the brake takes to open, s.
+        brake_stuck: Whether the brake does not open; fault injection.
+        brake_closed: Whether the brake is closed.
+        home_switch: Motor position of the home switch, counts.
+    """
 
     def __init__(
         self,
@@ -48,10 +58,10 @@ class SimDrive(SimNode):
 
         Args:
             node_id: 1 to 127.
-            description: Its objects; what is missing is not done.
-            wire: Where it is attached.
+            description: Its objects; functions whose objects are missing do nothing.
+            wire: Of the bus.
             units: Its encoder, and the units of its velocities and accelerations.
-            brake_time: Time the brake takes to open or close, s.
+            brake_time: Time the brake takes to open, s.
             home_switch: Motor position of the home switch, counts.
         """
         super().__init__(node_id, description, wire)
@@ -67,7 +77,7 @@ class SimDrive(SimNode):
         if units.velocity == VelocityUnit.RPM:
             self.store.fix(0x60A9, 0, 0x00B44700)
         if not self.store.number(0x1000):
-            self.store.fix(0x1000, 0, 0x00020192)  # A servo drive; not in every EDS.
+            self.store.fix(0x1000, 0, 0x00020192)  # Servo drive; missing in some EDS.
         self.store.hooks[0x6060] = self._check_mode
         self.on_reset()
 
@@ -96,7 +106,7 @@ class SimDrive(SimNode):
             self.state = State.SWITCH_ON_DISABLED
 
     def trip(self, code: int) -> None:
-        """Goes into fault reaction, transition 13, and says why."""
+        """Enters FAULT REACTION ACTIVE, transition 13, and sends the EMCY."""
         if self.state in (State.FAULT_REACTION, State.FAULT):
             return
         self.store.set(0x603F, 0, code)
@@ -106,7 +116,7 @@ class SimDrive(SimNode):
         self.emergency(code, _GENERIC | (_COMMUNICATION if is_bus else _PROFILE))
 
     def on_connection_lost(self) -> None:
-        """Object 6007h, abort connection option code; fault where there is none."""
+        """Acts on 6007h, abort connection option; faults if the drive lacks it."""
         if self.state not in _POWERED:
             return
         option = self.store.number(0x6007, otherwise=AbortOption.FAULT)
@@ -118,7 +128,7 @@ class SimDrive(SimNode):
             self._command(Command.QUICK_STOP)
 
     def on_write(self, index: int, sub: int, value: Value) -> None:
-        """Controlword, and what the modes look at."""
+        """Acts on controlword and mode of operation."""
         if index == 0x6040 and isinstance(value, int):
             previous, self._controlword = self._controlword, value
             command = command_of(value, previous)
@@ -131,7 +141,7 @@ class SimDrive(SimNode):
             self._hold_here()
 
     def on_sync(self, now: float) -> None:
-        """Takes the target of CSP and IP."""
+        """Takes the target in CSP and IP mode."""
         mode = self.store.number(0x6060)
         if self.state != State.ENABLED or self._leaving or self._is_halted:
             return
@@ -150,7 +160,7 @@ class SimDrive(SimNode):
         self._limited = cut or target != wanted
 
     def refresh(self) -> None:
-        """Statusword and actual values."""
+        """Updates statusword and actual values."""
         store = self.store
         store.set(0x6041, 0, self.statusword())
         store.set(0x6064, 0, _int32(self.position))
@@ -182,7 +192,7 @@ class SimDrive(SimNode):
         return int(word)
 
     def step(self, now: float) -> None:
-        """Moves motor, brake and state machine on to `now`."""
+        """Advances motor, brake and state machine to `now`."""
         dt, self._moved = now - self._moved, now
         super().step(now)
         if dt <= 0.0:
@@ -191,7 +201,7 @@ class SimDrive(SimNode):
             self.state, self._next = self._next[0], None
             if self.state == State.ENABLED:
                 self._hold_here()
-        # While the brake opens, the motor holds: else the arm would sag.
+        # While the brake opens the motor holds, or the arm would sag.
         opening = self._next is not None
         if self.state in _POWERED or opening:
             if not opening:
@@ -200,7 +210,7 @@ class SimDrive(SimNode):
                 self.demand.position - self._offset, self.demand.velocity, dt
             )
             if not opening:
-                self._watch_following(now)
+                self._monitor_following(now)
         else:
             self.motor.coast(dt, brake=self.brake_closed)
             self.demand.hold(self.position)
@@ -218,17 +228,11 @@ class SimDrive(SimNode):
     @property
     def _velocity_scale(self) -> float:
         """Counts/s per drive unit of velocity."""
-        is_rpm = self._units.velocity == VelocityUnit.RPM
-        return self._units.counts_per_turn / 60.0 if is_rpm else 1.0
-
-    @property
-    def _acceleration_scale(self) -> float:
-        is_rpm = self._units.acceleration == AccelerationUnit.RPM_PER_S
-        return self._units.counts_per_turn / 60.0 if is_rpm else 1.0
+        return self._units.counts_per_rad / self._units.speed_scale()
 
     @property
     def _speed_limit(self) -> float:
-        """Lower one of 607Fh and 6080h, counts/s; without them, none."""
+        """Lower one of 607Fh and 6080h, counts/s; very high without them."""
         limits = [1e12]
         if self.store.number(0x607F):
             limits.append(self.store.number(0x607F) * self._velocity_scale)
@@ -237,12 +241,14 @@ class SimDrive(SimNode):
             limits.append(turns * self._units.counts_per_turn)
         return min(limits)
 
-    def _ramp(self, index: int, otherwise: float = 1e7) -> float:
+    def _ramp(self, index: int) -> float:
+        """Acceleration in an object, counts/s²; 1e7 if it is 0 or missing."""
         value = self.store.number(index)
-        return value * self._acceleration_scale if value else otherwise
+        scale = self._units.counts_per_rad / self._units.acceleration_scale()
+        return value * scale if value else 1e7
 
     def _clamp(self, target: int) -> int:
-        """Object 607Dh; equal bounds, or a lower upper one, are no limit."""
+        """Clips to 607Dh; without effect unless its lower bound is below its upper."""
         low, high = self.store.number(0x607D, 1), self.store.number(0x607D, 2)
         return target if low >= high else min(high, max(low, target))
 
@@ -261,13 +267,13 @@ class SimDrive(SimNode):
             raise SdoAbortError(_NO_MODE)
 
     def _command(self, command: Command) -> None:
-        """Transitions 2 to 16 but 13 and 14."""
+        """Makes the transitions on command: 2 to 12, 15 and 16."""
         if self._next is not None and command in (
             Command.DISABLE_VOLTAGE,
             Command.QUICK_STOP,
             Command.SHUTDOWN,
         ):
-            self._next = None  # The brake was about to open: it stays closed.
+            self._next = None  # The brake was opening: it closes again.
             self.brake_closed = True
         key = (self.state, command)
         if key not in TRANSITIONS or self._next is not None:
@@ -305,7 +311,7 @@ class SimDrive(SimNode):
             self.state = state
 
     def _switch_off(self, state: State) -> None:
-        """Power goes; the brake closes at once, whatever the axis does."""
+        """Removes power; the brake closes at once, even while the axis moves."""
         self.state, self._leaving, self._next = state, None, None
         self.brake_closed = True
 
@@ -337,7 +343,7 @@ class SimDrive(SimNode):
             self._follow_mode(dt)
 
     def _stop_for(self, index: int, after: State | None, dt: float) -> None:
-        """Ramps by an option code: 1 and 5 slow down, others the quick stop ramp."""
+        """Brakes by an option code: 1 and 5 on 6084h, others on the quick stop ramp."""
         option = self.store.number(index, otherwise=2)
         ramp = self._ramp(0x6084 if option in (1, 5) else 0x6085)
         if option == 0 or self.demand.brake(ramp, dt):
@@ -364,13 +370,13 @@ class SimDrive(SimNode):
         run.step(self.demand, speed, self._ramp(0x609A), dt)
         settled = abs(self.demand.position - self.position) < 1.0
         if run.is_done and settled:
-            # Object 607Ch: position of the drive's zero as seen from home.
+            # 607Ch: offset of the drive's zero from home.
             self._offset = self.store.number(0x607C) - self.motor.position
             self._hold_here()
             self._homed = True
 
-    def _watch_following(self, now: float) -> None:
-        """Objects 6065h and 6066h."""
+    def _monitor_following(self, now: float) -> None:
+        """Trips when the following error exceeds 6065h for longer than 6066h."""
         window = self.store.number(0x6065)
         error = abs(self.demand.position - self.position)
         if not window or error <= window:

@@ -13,7 +13,9 @@ class SimIo(SimNode):
     """Eight digital inputs and outputs, one analogue each.
 
     Attributes:
-        history: (time s, outputs 6200h:1) of each change of the digital outputs.
+        history: (time s, outputs 6200h:1) at each change of the digital outputs.
+        inputs: Digital inputs, 6000h:1.
+        pressure: Analogue input, 6401h:1, counts.
     """
 
     def __init__(self, node_id: int, wire: Wire) -> None:
@@ -34,7 +36,7 @@ class SimIo(SimNode):
         return self.store.number(0x6411, 1)
 
     def refresh(self) -> None:
-        """Inputs to the store."""
+        """Copies the inputs to the store."""
         self.store.set(0x6000, 1, self.inputs)
         self.store.set(0x6401, 1, self.pressure)
 
@@ -43,11 +45,11 @@ class SimIo(SimNode):
         self._note()
 
     def on_write(self, index: int, sub: int, value: object) -> None:
-        """Notes changes of the outputs."""
+        """Records changes of the outputs."""
         self._note()
 
     def on_connection_lost(self) -> None:
-        """Outputs take their error values where the error mode says so."""
+        """Sets outputs to their error values if the error mode is on."""
         mode, safe = self.store.number(0x6206, 1), self.store.number(0x6207, 1)
         self.store.set(0x6200, 1, self.outputs & ~mode | safe & mode)
         if self.store.number(0x6443, 1) == 1:

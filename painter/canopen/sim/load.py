@@ -1,4 +1,4 @@
-"""What the simulated motors move: anything that turns demands into motion."""
+"""Interface of the load that simulated motors move."""
 
 from typing import Protocol
 
@@ -6,16 +6,16 @@ from perception.ground import FloatArray
 
 
 class Load(Protocol):
-    """The arm that hangs on the motors; axes in the order of `units.AXES`."""
+    """The arm on the motors; axes in the order of `units.AXES`."""
 
     def axes(self) -> tuple[FloatArray, FloatArray]:
-        """Returns where the axes are, (5,) rad, and how fast they turn, (5,) rad/s."""
+        """Returns positions, (5,) rad, and speeds, (5,) rad/s, of the axes."""
 
     def step(self, demand: FloatArray, velocity: FloatArray, dt: float) -> None:
-        """Moves on.
+        """Advances by one step.
 
         Args:
-            demand: (5,) where the drives' position loops want the axes, rad.
-            velocity: (5,) how fast, rad/s.
-            dt: Time, s.
+            demand: (5,) positions demanded by the drives, rad.
+            velocity: (5,) speeds demanded by the drives, rad/s.
+            dt: Duration of the step, s.
         """

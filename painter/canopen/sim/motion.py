@@ -13,17 +13,17 @@ _HERE = (35, 37)
 
 @dataclass
 class Demand:
-    """What the position loop is asked for, counts and counts/s."""
+    """Input of the position loop, counts and counts/s."""
 
     position: float = 0.0
     velocity: float = 0.0
 
     def hold(self, position: float) -> None:
-        """Asks for standstill at a position."""
+        """Demands standstill at a position."""
         self.position, self.velocity = position, 0.0
 
     def brake(self, deceleration: float, dt: float) -> bool:
-        """Ramps down; returns whether it stands."""
+        """Ramps down by one step; returns whether it has stopped."""
         step = deceleration * dt
         if abs(self.velocity) <= step:
             self.velocity = 0.0
@@ -35,13 +35,13 @@ class Demand:
     def approach(
         self, target: float, speed: float, acceleration: float, dt: float
     ) -> bool:
-        """Goes to a target by a trapezoidal profile; returns whether it is there."""
+        """Moves one step on a trapezoidal profile; returns whether it has arrived."""
         distance = target - self.position
         step = acceleration * dt
         if abs(distance) <= max(1.0, step * dt) and abs(self.velocity) <= 2.0 * step:
             self.hold(target)
             return True
-        # The velocity from which the ramp ends at the target, one step ahead.
+        # The velocity whose ramp ends at the target, one step ahead.
         allowed = math.sqrt(2.0 * acceleration * abs(distance)) - step / 2.0
         allowed = min(max(allowed, 0.0), speed, abs(distance) / dt)
         wanted = math.copysign(allowed, distance)
@@ -51,7 +51,7 @@ class Demand:
 
 
 class SyncedTarget:
-    """Targets that come with each SYNC (CSP and IP), joined by straight lines."""
+    """Linear interpolation between the targets of SYNCs (CSP and IP)."""
 
     def __init__(self) -> None:
         """Creates it without a target."""
@@ -61,15 +61,15 @@ class SyncedTarget:
         self._period = 0.0
 
     def reset(self, position: float, now: float) -> None:
-        """Stays at a position until a target comes."""
+        """Holds a position until the next target."""
         self._start = self._target = position
         self._since, self._period = now, 0.0
 
     def take(
         self, demand: Demand, target: float, *, now: float, period: float, speed: float
     ) -> bool:
-        """Takes a target for one period; returns whether the speed limit cut it."""
-        # A SYNC some microseconds early or late is still the end of the last line.
+        """Takes a target for one period; returns whether the speed limit cuts it."""
+        # A SYNC slightly early or late still continues the last segment.
         is_next = 0.5 * self._period < now - self._since < 1.5 * self._period
         start = self._target if is_next else demand.position
         step = target - start
@@ -82,13 +82,13 @@ class SyncedTarget:
         return cut
 
     def follow(self, demand: Demand, now: float) -> None:
-        """Moves the demand to where the line is now."""
+        """Sets the demand to the interpolated target."""
         elapsed = now - self._since
         if self._period <= 0.0:
             demand.hold(self._target)
             return
         slope = (self._target - self._start) / self._period
-        if elapsed >= 1.5 * self._period:  # SYNC is late: stand.
+        if elapsed >= 1.5 * self._period:  # The next SYNC is overdue: hold.
             demand.hold(self._target)
             return
         demand.position = self._start + slope * min(elapsed, self._period)
@@ -97,7 +97,7 @@ class SyncedTarget:
 
 @dataclass
 class HomingRun:
-    """One homing: to the switch and, on the zero there, to the end.
+    """One run of homing, which ends at the home switch.
 
     Attributes:
         method: 6098h.
@@ -112,7 +112,7 @@ class HomingRun:
     def step(
         self, demand: Demand, speed: float, acceleration: float, dt: float
     ) -> None:
-        """Moves one step; methods 35 and 37 are done where the axis stands."""
+        """Moves one step; methods 35 and 37 finish at the present position."""
         if self.method in _HERE or demand.approach(
             self.switch, speed, acceleration, dt
         ):

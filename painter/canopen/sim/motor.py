@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-# Natural frequency, rad/s, and damping of the closed loop: our choice, of the order of
-# what servo drives with harmonic gears reach.
+# Natural frequency, rad/s, and damping ratio of the closed loop: our choice, of the
+# order that servo drives with harmonic gears reach.
 _FREQUENCY = 120.0
 _DAMPING = 1.0
 
@@ -13,11 +13,11 @@ class Motor:
     """Position and velocity in counts and counts/s.
 
     Attributes:
-        position: Where the axis is.
-        velocity: How fast it goes.
-        acceleration_limit: What the torque allows, counts/s².
-        friction: Deceleration of the motor without power, counts/s².
-        is_blocked: True if something holds the axis; fault injection.
+        position: Of the axis.
+        velocity: Of the axis.
+        acceleration_limit: By the torque limit, counts/s².
+        friction: Deceleration without power, counts/s².
+        is_blocked: Whether an obstacle holds the axis; fault injection.
     """
 
     position: float = 0.0
@@ -27,7 +27,7 @@ class Motor:
     is_blocked: bool = False
 
     def drive(self, demand: float, demand_velocity: float, dt: float) -> None:
-        """Moves under power towards a demand.
+        """Moves one step under power towards a demand.
 
         Source: PD with velocity feed-forward,
         a = w² (demand - x) + 2 d w (demand velocity - v), integrated semi-implicitly
@@ -44,7 +44,7 @@ class Motor:
         self.position += self.velocity * dt
 
     def coast(self, dt: float, *, brake: bool) -> None:
-        """Moves without power: the brake holds at once, friction does slowly."""
+        """Moves one step without power: the brake holds at once, friction slows."""
         if brake or self.is_blocked:
             self.velocity = 0.0
             return
@@ -55,12 +55,12 @@ class Motor:
 
 @dataclass
 class LoadedMotor(Motor):
-    """A motor whose motion a load works out: keeps what the load is to do.
+    """A motor whose motion is computed by a load; it only stores the demand.
 
     Attributes:
-        demand: Where the axis shall be, counts.
-        demand_velocity: How fast it shall go, counts/s.
-        is_held: Whether the brake, or what blocks the axis, holds it at `demand`.
+        demand: Demanded position, counts.
+        demand_velocity: Demanded velocity, counts/s.
+        is_held: Whether the brake or an obstacle holds the axis at `demand`.
     """
 
     demand: float = 0.0
@@ -68,7 +68,7 @@ class LoadedMotor(Motor):
     is_held: bool = True
 
     def drive(self, demand: float, demand_velocity: float, dt: float) -> None:
-        """Asks the load for a motion under power."""
+        """Stores the demand under power."""
         if self.is_blocked:
             self._hold()
             return
@@ -76,7 +76,7 @@ class LoadedMotor(Motor):
         self.is_held = False
 
     def coast(self, dt: float, *, brake: bool) -> None:
-        """Asks the load to hold: the brake closes as power goes."""
+        """Holds the axis: the brake closes when power is removed."""
         self._hold()
 
     def _hold(self) -> None:

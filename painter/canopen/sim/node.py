@@ -129,9 +129,9 @@ class SimNode:
         if period and self.now >= self._next_heartbeat:
             self._next_heartbeat = self.now + period
             self.send(HEARTBEAT_BASE + self.node_id, bytes([self.nmt]))
-        self._watch_heartbeats()
+        self._monitor_heartbeats()
         if self.nmt == NmtState.OPERATIONAL:
-            self._watch_rpdos()
+            self._monitor_rpdos()
             self._send_events()
 
     def reboot(self) -> None:
@@ -232,7 +232,7 @@ class SimNode:
             self._sent[pdo.number] = data
             self.send(pdo.cob_id, data)
 
-    def _watch_rpdos(self) -> None:
+    def _monitor_rpdos(self) -> None:
         """RPDO deadlines, 140xh:5, clause 7.5.2.35; armed by the first RPDO."""
         for pdo in self.pdos.received():
             came = self._came.get(pdo.number)
@@ -243,7 +243,7 @@ class SimNode:
                 self.emergency(RPDO_TIMEOUT, 0x11)
                 self.on_connection_lost()
 
-    def _watch_heartbeats(self) -> None:
+    def _monitor_heartbeats(self) -> None:
         """Consumer heartbeat time, 1016h; armed by the first heartbeat heard."""
         for sub in range(1, self.store.number(0x1016) + 1):
             entry = self.store.number(0x1016, sub)

@@ -1,4 +1,4 @@
-"""Process data of a simulated node: mapping rules, packing, unpacking.
+"""Process data of a simulated node: mapping rules, encoding, decoding.
 
 Source: CiA 301 v4.2.0, 7.5.2.35 to 7.5.2.38 (parameters and mapping of PDOs).
 """
@@ -19,13 +19,13 @@ _BAD_STATE = 0x08000022
 
 @dataclass(frozen=True)
 class Pdo:
-    """One PDO that is switched on.
+    """One valid PDO.
 
     Attributes:
         number: 0 for the first.
         cob_id: Its identifier.
-        transmission: 0 to 240 with SYNC, 254 and 255 at once.
-        event_time: Event timer, s; 0 is none.
+        transmission: Type: 0 to 240 with SYNC, 254 and 255 event-driven.
+        event_time: Event timer, s; 0 for none.
         objects: (index, sub) and size in bytes, in order.
     """
 
@@ -37,10 +37,10 @@ class Pdo:
 
 
 class PdoEngine:
-    """PDOs of one store; refuses what a real node refuses."""
+    """PDOs of one store; rejects what a real node rejects."""
 
     def __init__(self, store: ObjectStore) -> None:
-        """Creates the engine and puts its rules into the store."""
+        """Creates the engine and hooks its rules into the store."""
         self._store = store
         self._cache: dict[int, list[Pdo]] = {}
         for parameters, maps in ((0x1400, 0x1600), (0x1800, 0x1A00)):
@@ -53,19 +53,19 @@ class PdoEngine:
                 )
 
     def invalidate(self) -> None:
-        """To be called when the store changed but through an SDO."""
+        """Drops cached PDOs; call it after changes that were no SDO write."""
         self._cache = {}
 
     def received(self) -> list[Pdo]:
-        """RPDOs that are switched on."""
+        """Returns the valid RPDOs."""
         return self._active(0x1400, 0x1600)
 
     def transmitted(self) -> list[Pdo]:
-        """TPDOs that are switched on."""
+        """Returns the valid TPDOs."""
         return self._active(0x1800, 0x1A00)
 
     def data(self, pdo: Pdo) -> bytes:
-        """Packs the objects of a TPDO."""
+        """Encodes the objects of a TPDO."""
         store = self._store
         return b"".join(
             pack(store.find(index, sub).data_type, store.values[index, sub])
@@ -110,7 +110,7 @@ class PdoEngine:
         assert isinstance(value, int)
         current = self._store.number(index, 1)
         if sub == 1 and not (current | value) & _INVALID and current != value:
-            raise SdoAbortError(_BAD_VALUE)  # Off before its identifier changes.
+            raise SdoAbortError(_BAD_VALUE)  # Must be off to change the identifier.
         if sub == 2 and 240 < value < 252:
             raise SdoAbortError(_BAD_VALUE)
         self._cache = {}

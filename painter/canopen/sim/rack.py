@@ -1,4 +1,4 @@
-"""All simulated nodes of a bus file on one wire, and faults by name."""
+"""All simulated nodes of a bus file on one wire, and faults to inject."""
 
 from collections import deque
 from collections.abc import Callable
@@ -22,15 +22,25 @@ STEP = 0.001
 
 
 class Rack:
-    """The simulated nodes of a bus, in simulated time."""
+    """The simulated nodes of a bus, in simulated time.
+
+    Attributes:
+        bus: The bus file.
+        wire: The bus.
+        drives: By axis.
+        io: The I/O node.
+        transport: The master's end of the wire.
+        now: Simulated time, s.
+        stepped: Called after each step of 1 ms.
+    """
 
     def __init__(self, bus: BusConfig, load: Load | None = None) -> None:
         """Creates all drives and the I/O node, before their boot-up.
 
         Args:
-            bus: What is on the bus; drives have the objects of their EDS.
-            load: What the motors move, and where they stand; None = motors alone, each
-                with its own inertia, at position 0.
+            bus: The bus file; drives have the objects of their EDS.
+            load: What the motors move; None = motors alone, each with its own inertia,
+                at position 0.
         """
         self.bus = bus
         self.wire = Wire(bus.bitrate)
@@ -49,7 +59,6 @@ class Rack:
         self.io = SimIo(bus.io.node_id, self.wire)
         self.transport = WireTransport(self)
         self.now = 0.0
-        # Called after each step of 1 ms.
         self.stepped: Callable[[], None] = lambda: None
         self._load = load
         if load is not None:
@@ -68,7 +77,7 @@ class Rack:
 
     @property
     def sync_period(self) -> float:
-        """Time between two SYNCs that the drives were told, s; 0 = none moves by it."""
+        """Cycle written to the operational drives (60C2h), s; 0 without any."""
         return max(
             (
                 drive.period
@@ -79,7 +88,7 @@ class Rack:
         )
 
     def advance(self, until: float) -> None:
-        """Lets frames, motors and timers run, 1 ms a step."""
+        """Advances frames, motors and timers to a time, s, in steps of 1 ms."""
         while (after := STEP * (round(self.now / STEP) + 1)) <= until + 1e-9:
             self.now = after
             self.wire.advance(self.now)
@@ -91,7 +100,7 @@ class Rack:
         self.wire.advance(until)
 
     def _move(self, load: Load) -> None:
-        """Lets the load follow what the drives ask of it."""
+        """Moves the load by the demands of the drives."""
         pairs = list(zip(self._units, self._motors, strict=True))
         load.step(
             np.array([unit.angle(motor.demand) for unit, motor in pairs]),
@@ -114,11 +123,11 @@ class Rack:
             motor.velocity = float(v) * scale
 
     def inject(self, fault: Fault, axis: str = "base_yaw") -> None:
-        """Makes a fault happen now.
+        """Injects a fault now.
 
         Args:
             fault: What fails.
-            axis: Which drive; counts only for faults of a drive.
+            axis: Which drive; ignored unless a drive fails.
         """
         drive = self.drives[axis]
         if fault == Fault.EMCY:
@@ -149,7 +158,7 @@ class Rack:
             self.transport.is_down = True
 
     def clear(self) -> None:
-        """Ends all faults that last; tripped drives still need their reset."""
+        """Ends all lasting faults; tripped drives still need a fault reset."""
         for name, drive in self.drives.items():
             drive.motor.is_blocked = drive.silent = drive.tpdo_silent = False
             drive.brake_stuck = False
@@ -163,7 +172,11 @@ class Rack:
 
 
 class WireTransport:
-    """The master's port on the wire of a rack, in the same thread."""
+    """The master's port on the wire of a rack, in the same thread.
+
+    Attributes:
+        is_down: Whether the adapter is unplugged; fault injection.
+    """
 
     def __init__(self, rack: Rack) -> None:
         """Attaches to the wire."""
@@ -174,7 +187,7 @@ class WireTransport:
         self._send = rack.wire.attach(self._take)
 
     def send(self, frame: Frame) -> None:
-        """Sends now; a controller that is bus-off loses it.
+        """Sends a frame; a controller that is bus-off loses it.
 
         Raises:
             TransportError: The adapter is unplugged.
@@ -184,7 +197,7 @@ class WireTransport:
             self._send(frame, self._rack.now)
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns what came; simulated time does not pass in here.
+        """Returns received frames; simulated time does not advance here.
 
         Raises:
             TransportError: The adapter is unplugged.
@@ -195,7 +208,7 @@ class WireTransport:
         return frames
 
     def reopen(self) -> None:
-        """Starts the controller again.
+        """Restarts the controller.
 
         Raises:
             TransportError: The adapter is unplugged.
@@ -208,7 +221,7 @@ class WireTransport:
         """Nothing to close."""
 
     def bus_off(self) -> None:
-        """Makes the controller go bus-off, and say so."""
+        """Makes the controller go bus-off, with an error frame."""
         self._is_off = True
         self._frames.append(Frame(ERROR_BUS_OFF, bytes(8), is_error=True))
 

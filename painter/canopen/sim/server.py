@@ -1,4 +1,4 @@
-"""Simulated drives as a process: a rack in real time, behind a transport."""
+"""Simulated drives as a process: a rack in real time on a transport."""
 
 import contextlib
 import math
@@ -24,15 +24,15 @@ from painter.timebase import TimeBase
 
 _MOST_BEHIND = 0.1
 _MOST_AT_ONCE = 2.0 * STEP
-# How long the rack's time waits for a SYNC that is due, s: what this computer's
-# scheduler does to either process is not of the bus.
+# How long the rack's time waits for a SYNC that is due, s: delays by this computer's
+# scheduler are not delays of the bus.
 _PATIENCE = 0.05
-# How fast the run's clock may be found to be late on the SYNCs' time, s a SYNC.
+# How fast the origin of the rack's time follows later SYNCs, s per SYNC.
 _CREEP = 0.0001
 
 
 class LocalHub:
-    """Listens on a local socket and joins all clients on one wire; a `CanTransport`."""
+    """Joins all clients of a local socket on one wire; a `CanTransport`."""
 
     def __init__(self, path: str) -> None:
         """Listens.
@@ -56,11 +56,11 @@ class LocalHub:
         self._clients: list[socket.socket] = []
 
     def send(self, frame: Frame) -> None:
-        """Sends to all who are connected; those who do not read are dropped."""
+        """Sends to all clients; drops those that do not read."""
         self._send(frame, besides=None)
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns frames that came; waits up to `timeout` s for the first one."""
+        """Returns received frames; waits up to `timeout` s for the first one."""
         frames: list[Frame] = []
         waiting = [self._listener, *self._clients]
         ready, _, _ = select.select(waiting, [], [], timeout)
@@ -74,10 +74,10 @@ class LocalHub:
         return frames
 
     def reopen(self) -> None:
-        """It never closes by itself."""
+        """Does nothing: it never closes by itself."""
 
     def close(self) -> None:
-        """Disconnects all and removes the socket."""
+        """Disconnects all clients and removes the socket."""
         for client in self._clients:
             client.close()
         self._listener.close()
@@ -124,9 +124,8 @@ class RackServer:
     Attributes:
         rack: The simulated nodes.
         transport: To the master.
-        slips: How often the rack's time fell behind for good.
-        sync_late: Longest time from when a SYNC was due until it was taken, s by the
-            run's clock.
+        slips: How often the rack's time fell behind without catching up.
+        sync_late: Longest delay of a SYNC until it was taken, s by the run's clock.
     """
 
     def __init__(
@@ -135,9 +134,9 @@ class RackServer:
         """Opens the transport of the bus file ("local" listens) and powers the rack.
 
         Args:
-            bus: What is on the bus.
+            bus: The bus file.
             load: What the motors move; see `Rack`.
-            clock: The run's; None = the machine's.
+            clock: Of the run; None = the machine's.
 
         Raises:
             TransportError: The transport cannot be opened.
@@ -148,8 +147,8 @@ class RackServer:
         )
         self._send = self.rack.wire.attach(self._to_link)
         self._clock = clock or TimeBase()
-        # The run's clock at the rack's time 0, s: as the rack's own clock has it, which
-        # follows each SYNC, and as those of the last ones have it that were least late.
+        # The run's clock at the rack's time 0, s: `_start` follows each SYNC, `_origin`
+        # the SYNCs with the least delay.
         self._start = self._origin = self._clock.now()
         self.slips = 0
         self.sync_late = 0.0
@@ -157,21 +156,21 @@ class RackServer:
         self._sync_due = math.inf
 
     def run(self, is_done: Callable[[float], bool]) -> None:
-        """Runs until `is_done`, which is asked about every ms with the rack's time."""
+        """Runs until `is_done` of the rack's time, called about every ms, is true."""
         freeze_gc()
         while not is_done(self.rack.now):
             self.serve()
 
     def clock_time(self) -> float:
-        """Returns the rack's present time by the run's clock, s."""
+        """Returns the rack's present time on the run's clock, s."""
         return self._origin + self.rack.now
 
     def close(self) -> None:
-        """Gives the transport up."""
+        """Closes the transport."""
         self.transport.close()
 
     def _now(self) -> float:
-        """Time of the rack; it slips when this process was held up for long."""
+        """Returns the rack's time; it slips after a long delay of this process."""
         now = self._clock.now() - self._start
         behind = now - self.rack.now
         if behind > _MOST_BEHIND:
@@ -182,7 +181,7 @@ class RackServer:
         return now
 
     def _horizon(self, now: float) -> float:
-        """How far the rack's time may go: to a SYNC that is due, but not for ever."""
+        """Returns how far the rack may advance: not past a SYNC that is due."""
         due = self._sync_due
         return now if now > due + _PATIENCE else min(now, due)
 
@@ -193,14 +192,14 @@ class RackServer:
         for frame in frames:
             if frame.cob_id == SYNC_ID:
                 now = self._take_sync(now)
-            if not frame.is_error:  # Of this computer's controller; no node sees it.
-                # Held up, this process cannot know when it came: before the next step.
+            if not frame.is_error:  # From this computer's driver; no node sees it.
+                # Its time of arrival is unknown after a delay: before the next step.
                 self._send(frame, self.rack.now)
-        # Held up, it goes on in short steps: there may be frames to be read between.
+        # After a delay it catches up in short steps, to read frames in between.
         self.rack.advance(min(self._horizon(now), self.rack.now + _MOST_AT_ONCE))
 
     def _wait(self, now: float) -> float:
-        """How long there is nothing to do but to look for frames, s; a step at most."""
+        """Returns how long to wait for frames, s; a step at most."""
         step, end = self.rack.now + STEP, self.rack.wire.next_end()
         due = step if end is None else min(step, end)
         is_held = now >= due > self._horizon(now) + 1e-9
@@ -216,10 +215,10 @@ class RackServer:
         return []
 
     def _take_sync(self, now: float) -> float:
-        """Goes on to a SYNC that has come by now; returns its time in the rack, s.
+        """Advances to a received SYNC; returns its time in the rack, s.
 
-        It is a cycle after the one before; the first one after long is on the next
-        whole step.
+        It is one cycle after the previous one; the first one after a pause is on the
+        next whole step.
         """
         due = self._sync_due
         is_new = math.isinf(due) or now > due + _PATIENCE
@@ -232,8 +231,8 @@ class RackServer:
         latest = self._start if is_new else self._origin + _CREEP
         self._origin = min(self._start, latest)
         self.rack.advance(when)
-        # What came before it is heard before it: two targets at the next SYNC would be
-        # two cycles' way in one.
+        # Frames received before it are carried before it: two targets at the next SYNC
+        # would be the distance of two cycles in one.
         while (end := self.rack.wire.next_end()) is not None:
             self.rack.wire.advance(end)
         self._sync_due = when + (self.rack.sync_period or math.inf)

@@ -1,4 +1,4 @@
-"""A CAN wire in simulated time: arbitration, and the time each frame takes."""
+"""A CAN bus in simulated time: arbitration and transmission times."""
 
 import itertools
 from collections.abc import Callable
@@ -11,7 +11,7 @@ Receiver = Callable[[Frame, float], None]
 
 @dataclass(frozen=True, order=True)
 class _Pending:
-    """A frame that waits for the wire; sorts as arbitration does."""
+    """A frame that waits for the bus; sorts in the order of arbitration."""
 
     cob_id: int
     order: int
@@ -23,15 +23,20 @@ class _Pending:
 class Wire:
     """Carries frames between ports, one after the other, lowest identifier first.
 
-    Every frame is charged the most bits it can take, so a design that passes here
-    passes on copper.
+    Every frame takes its maximum number of bits, so that a bus load that passes here
+    passes on a real bus.
+
+    Attributes:
+        receivers: One for each port.
+        busy_time: Total transmission time, s.
+        frame_count: Number of frames carried.
     """
 
     def __init__(self, bitrate: int) -> None:
         """Creates an idle wire.
 
         Args:
-            bitrate: Bits a second.
+            bitrate: Bits per second.
         """
         self._bitrate = bitrate
         self.receivers: list[Receiver] = []
@@ -45,7 +50,7 @@ class Wire:
         """Adds a port.
 
         Args:
-            receiver: Gets each frame of the other ports, and the time it ended, s.
+            receiver: Gets each frame of the other ports, and the time of its end, s.
 
         Returns:
             A function that sends a frame from this port at a time, s.
@@ -60,14 +65,14 @@ class Wire:
         return send
 
     def next_end(self) -> float | None:
-        """When the next frame will have ended, s; None while none waits."""
+        """Returns when the next frame will end, s; None if none waits."""
         if not self._pending:
             return None
         start, item = self._choose()
         return start + frame_time(len(item.frame.data), self._bitrate)
 
     def advance(self, until: float) -> None:
-        """Carries all frames that end by then, and those they cause."""
+        """Carries all frames that end by a time, s, and the frames they trigger."""
         while self._pending:
             start, item = self._choose()
             end = start + frame_time(len(item.frame.data), self._bitrate)
@@ -80,12 +85,12 @@ class Wire:
             self.deliver(item.frame, item.port, end)
 
     def deliver(self, frame: Frame, sender: int, end: float) -> None:
-        """Hands a frame to all ports but its sender's."""
+        """Delivers a frame to all ports but the sender's."""
         for port, receive in enumerate(self.receivers):
             if port != sender:
                 receive(frame, end)
 
     def _choose(self) -> tuple[float, _Pending]:
-        """Start time and frame that wins the next arbitration."""
+        """Returns the start time and the frame that wins the next arbitration."""
         start = max(self._free, min(item.ready for item in self._pending))
         return start, min(item for item in self._pending if item.ready <= start)

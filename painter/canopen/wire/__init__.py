@@ -1,4 +1,4 @@
-"""Ways to a bus, and logs of what passed on it.
+"""Transports of CAN frames, and logs of them.
 
-Moves frames; does not know what they mean.
+Moves frames; knows nothing of their meaning.
 """

@@ -1,9 +1,9 @@
-"""Writes what passes on the bus to a log, without holding up the bus.
+"""Logs the frames of the bus without delaying the bus.
 
-`TappedTransport` stands before a transport and puts copies of all frames into a pipe; a
-process of its own, below everything else, makes text of them. The bus process never
-waits: a pipe that is full loses frames of the log, and the log's writer says how many.
-When the bus process dies, what it sent before is in the log.
+`TappedTransport` wraps a transport and copies all frames into a pipe; a process of its
+own writes them as text. The bus process never waits: a full pipe drops frames of the
+log, and the writer reports how many. When the bus process dies, the log holds all that
+passed before.
 """
 
 import contextlib
@@ -24,47 +24,47 @@ from painter.errors import InputError
 from painter.timebase import TimeBase
 
 _LOGGER = logging.getLogger(__name__)
-# Time, identifier with two flags, length, data; _LOST in place of the length tells how
-# many frames the pipe did not take.
+# Time, identifier with two flags, length, data. With length _LOST, the identifier is
+# the number of frames that the pipe did not take.
 _RECORD = struct.Struct("<dIB3x8s")
 _SENT, _ERROR, _LOST = 1 << 31, 1 << 30, 0xFF
-# Whole records in what a pipe takes all or nothing of (POSIX: PIPE_BUF, 4096 here).
+# Whole records in an atomic write to a pipe (POSIX: PIPE_BUF, 4096 here).
 _MOST_AT_ONCE = _RECORD.size * (4096 // _RECORD.size)
 _PIPE_SIZE = 1 << 20
 _READ_AT_ONCE = 1 << 20
 _FLUSH_EVERY = 0.5
-_END_TIME = 60.0  # s; on a machine that works on other things.
+_END_TIME = 60.0  # s; generous, for a busy machine.
 
 
 class TappedTransport:
-    """A transport whose frames are copied into a pipe."""
+    """A transport that copies its frames into a pipe."""
 
     def __init__(
         self, transport: CanTransport, pipe: Connection, clock: TimeBase | None = None
     ) -> None:
-        """Stands before a transport.
+        """Wraps a transport.
 
         Args:
-            transport: The way to the bus.
+            transport: Of the bus.
             pipe: Write end to a `FrameLogger`.
-            clock: The run's; None = the machine's.
+            clock: Of the run; None = the machine's.
         """
         self._transport = transport
         self._pipe = pipe
         os.set_blocking(pipe.fileno(), False)
-        # Wall-clock time that goes on evenly when the clock is set.
+        # Wall-clock time that does not jump when the clock is set.
         self._clock = clock or TimeBase()
         self._offset = time.time() - self._clock.now()
         self._pending = bytearray()
         self._lost = 0
 
     def send(self, frame: Frame) -> None:
-        """Sends a frame; raises TransportError when the way is lost."""
+        """Sends a frame; raises TransportError when the transport fails."""
         self._transport.send(frame)
         self._note(frame, _SENT)
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns frames that came; raises TransportError when the way is lost."""
+        """Returns received frames; raises TransportError when the transport fails."""
         if timeout > 0.0 or len(self._pending) >= _MOST_AT_ONCE:
             self._flush()
         frames = self._transport.receive(timeout)
@@ -73,11 +73,11 @@ class TappedTransport:
         return frames
 
     def reopen(self) -> None:
-        """Opens the way again; raises TransportError when it cannot be."""
+        """Reopens the transport; raises TransportError if that fails."""
         self._transport.reopen()
 
     def close(self) -> None:
-        """Gives the way up and ends the log."""
+        """Closes the transport and ends the log."""
         self._transport.close()
         self._flush()
         self._pipe.close()
@@ -100,7 +100,7 @@ class TappedTransport:
     def _write(self, data: bytes | bytearray) -> bool:
         try:
             os.write(self._pipe.fileno(), data)
-        except OSError:  # Full, or the writer is gone: the bus goes on.
+        except OSError:  # Full, or the writer is gone: the bus continues.
             return False
         return True
 
@@ -112,8 +112,8 @@ class FrameLogger:
         """Opens the file and starts the process.
 
         Args:
-            path: Log to write; a file of that name is replaced.
-            channel: The bus's name in the log.
+            path: Log to write; replaces a file of that name.
+            channel: Name of the bus in the log.
 
         Raises:
             InputError: The file cannot be written.
@@ -135,17 +135,17 @@ class FrameLogger:
         read.close()
 
     def close(self) -> None:
-        """Waits until all that was sent is written."""
+        """Waits until all frames are written."""
         self.pipe.close()
         self._process.join(_END_TIME)
         if self._process.is_alive():
-            _LOGGER.error("the frame log did not end; killed.")
+            _LOGGER.error("the frame log did not end and was killed.")
             self._process.kill()
             self._process.join()
 
 
 def _write_log(pipe: Connection, path: Path, channel: str) -> None:
-    """Writes until the other end is closed; Ctrl-C is the parent's business."""
+    """Writes until the other end is closed; the parent handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Channels may be paths; the format separates by blanks.
     name = channel.replace(" ", "_")
@@ -166,4 +166,4 @@ def _write_log(pipe: Connection, path: Path, channel: str) -> None:
                 log.flush()
                 flushed = time.monotonic()
     if lost:
-        _LOGGER.warning("%s lacks %d frames: it could not be written fast.", path, lost)
+        _LOGGER.warning("%s lacks %d frames: the disk was too slow.", path, lost)

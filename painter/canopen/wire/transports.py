@@ -1,4 +1,4 @@
-"""Ways to a bus: any python-can interface, or a socket on this machine."""
+"""Transports of CAN frames: any python-can interface, or a socket on this machine."""
 
 import select
 import socket
@@ -21,27 +21,27 @@ T = TypeVar("T")
 
 
 class TransportError(BusError):
-    """The way to the bus is lost; it may be opened again."""
+    """The transport failed; it may be reopened."""
 
 
 class CanTransport(Protocol):
-    """A way to a bus, for one thread."""
+    """Carries frames to and from a bus, for one thread."""
 
     def send(self, frame: Frame) -> None:
-        """Sends a frame; raises TransportError when the way is lost."""
+        """Sends a frame; raises TransportError when the transport fails."""
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns frames that came; waits up to `timeout` s for the first one."""
+        """Returns received frames; waits up to `timeout` s for the first one."""
 
     def reopen(self) -> None:
-        """Opens the way again; raises TransportError when it cannot be."""
+        """Reopens the transport; raises TransportError if that fails."""
 
     def close(self) -> None:
-        """Gives the way up."""
+        """Closes the transport."""
 
 
 def open_transport(bus: BusConfig) -> CanTransport:
-    """Opens the interface and channel that a bus file names.
+    """Opens the interface and channel of a bus file.
 
     Raises:
         TransportError: It cannot be opened; names both.
@@ -58,17 +58,17 @@ class PythonCanTransport:
         """Opens it.
 
         Raises:
-            TransportError: It cannot be opened.
+            TransportError: It cannot be opened; names both.
         """
         self._options = (interface, channel, bitrate)
         self._bus: can.BusABC | None = None
-        # udp_multicast hands a bus its own frames back.
+        # udp_multicast returns a bus its own frames.
         self._echoes = interface == "udp_multicast"
         self._own: list[tuple[int, bytes]] = []
         self.reopen()
 
     def reopen(self) -> None:
-        """Opens the interface anew: a python-can bus that failed stays failed."""
+        """Opens the interface anew: a failed python-can bus does not recover."""
         self.close()
         interface, channel, bitrate = self._options
         extra: dict[str, Any] = {"fd": False} if self._echoes else {}
@@ -103,7 +103,7 @@ class PythonCanTransport:
             ) from error
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns frames that came; waits up to `timeout` s for the first one."""
+        """Returns received frames; waits up to `timeout` s for the first one."""
         if self._bus is None:
             raise TransportError("the CAN interface is closed.", code="PNT-BUS-034")
         frames: list[Frame] = []
@@ -160,14 +160,14 @@ class LocalTransport:
         """Connects.
 
         Raises:
-            TransportError: Nobody listens there.
+            TransportError: Nothing listens on the path.
         """
         self._path = path
         self._socket: socket.socket | None = None
         self.reopen()
 
     def reopen(self) -> None:
-        """Connects anew."""
+        """Reconnects."""
         self.close()
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         try:
@@ -184,7 +184,7 @@ class LocalTransport:
         self._do(lambda connection: connection.send(pack_frame(frame)))
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Returns frames that came; waits up to `timeout` s for the first one."""
+        """Returns received frames; waits up to `timeout` s for the first one."""
         frames: list[Frame] = []
         wait = max(timeout, 0.0)
         while len(frames) < _MOST_AT_ONCE:
@@ -217,11 +217,11 @@ class LocalTransport:
 
 
 def _receive(connection: socket.socket, *, wait: float) -> bytes | None:
-    # select() waits to the microsecond; a socket's own time-out is whole milliseconds.
+    # select() waits to the microsecond, a socket's own time-out to the millisecond.
     ready, _, _ = select.select([connection], [], [], wait)
     if not ready:
         return None
     packet = connection.recv(64)
     if not packet:
-        raise ConnectionResetError(104, "the other side closed")
+        raise ConnectionResetError(104, "the peer closed the connection")
     return packet

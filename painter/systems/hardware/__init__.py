@@ -1,4 +1,4 @@
-"""Systems of the robot's body: CANopen drives and gun, the RealSense camera.
+"""Systems of the hardware station: CANopen drives and gun, the RealSense camera.
 
 The only systems that import a bus or a camera.
 """

@@ -97,7 +97,7 @@ def test_frames_in_words(decoder, cob_id, data, kind, node, text):
         (
             (0x2B, 0x605A, 0, 9),
             (0x80, 0x605A, 0, 0x06090031),
-            "605Ah quick stop option: aborted, 06090031h value of parameter written "
+            "605Ah quick stop option: aborted, 06090031h Value of parameter written "
             "too high",
         ),
         (

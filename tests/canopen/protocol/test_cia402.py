@@ -90,6 +90,6 @@ def test_texts_name_the_code_or_its_class():
     assert emcy_text(0x3212) == "DC link over-voltage"
     assert emcy_text(0xFF17) == "device specific"
     assert emcy_text(0xB000) == "unknown error"
-    assert abort_text(0x06020000) == "object does not exist"
+    assert abort_text(0x06020000) == "Object does not exist"
     assert abort_text(1) == "unknown abort code"
     assert all(code >> 24 in (0x05, 0x06, 0x08) for code in SDO_ABORTS)

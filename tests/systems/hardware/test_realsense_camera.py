@@ -87,7 +87,7 @@ def test_colour_is_shown_where_it_fits(connection):
 
 def test_a_missing_camera_says_so(connection):
     connection.advance(0.1)
-    problem = "camera: no picture for 1 s. Try 1 of 5 follows."
+    problem = "camera: no picture for 1 s. Reopening, try 1 of 5."
     connection.reading = Reading(
         health=CameraHealth(CameraState.MISSING, problem, repeated=2, late=3)
     )
