@@ -19,11 +19,11 @@ class Stroke(FrozenValue):
             opens.
         end_T: (2,) m: where it closes.
         speed: Speed of that point along the wall, m/s.
-        kind: "body" for the raster, "cut_in" beside an edge; later "touch_up".
-        column: Number of the line it lies on, from the left.
-        standoff: Nozzle to wall, m; nearer, the fan is narrower.
+        kind: "body" for the raster, "cut_in" beside an edge, or "touch_up".
+        column: Number of its line, from the left.
+        standoff: Nozzle to wall, m; the nearer, the narrower the fan.
         flow: Share of the tip's nominal flow, above 0 up to 1.
-        coat: Number of the coat that it belongs to, from 1.
+        coat: Number of its coat, from 1.
     """
 
     start_T: FloatArray
@@ -41,7 +41,7 @@ class Stroke(FrozenValue):
         return float(np.linalg.norm(self.end_T - self.start_T))
 
     def part(self, begin: float, end: float) -> "Stroke":
-        """Returns its part between two shares of its length."""
+        """Returns the part between two shares of its length."""
         travel = self.end_T - self.start_T
         return self.replace(
             start_T=self.start_T + begin * travel, end_T=self.start_T + end * travel
@@ -85,13 +85,13 @@ class Motion(FrozenValue):
         return 1.0 if self.flow is None else float(self.flow[index])
 
     def strokes_done(self, time: float) -> float:
-        """Returns how many strokes are sprayed at `time` (s), with the share of one."""
+        """Returns the number of strokes sprayed by `time` (s), with fractions."""
         opens, closes = self.spray_on[:, 0], self.spray_on[:, 1]
         shares = np.clip((time - opens) / (closes - opens), 0.0, 1.0)
         return float(shares.sum())
 
     def sprays_within(self, start: float, end: float) -> bool:
-        """Returns whether the gun is to be open at any time in [start, end] (s)."""
+        """Returns whether the gun opens or is open within [start, end] (s)."""
         opens, closes = self.spray_on[:, 0], self.spray_on[:, 1]
         return bool(np.any((opens < end) & (closes > start)))
 
@@ -101,7 +101,7 @@ class SkippedStroke(FrozenValue):
     """A stroke, or a part of one, that is not in the program.
 
     Attributes:
-        stroke: What was left out.
+        stroke: What is left out.
         reason: Why, in one line.
     """
 
@@ -111,16 +111,16 @@ class SkippedStroke(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class PaintProgram(FrozenValue):
-    """What the robot is to do with one tile, ready to be approved and executed.
+    """The job of one tile, ready to be approved and executed.
 
     Attributes:
         strokes: In order of execution.
-        motion: Approach, strokes, turns and transits as one motion.
+        motion: Approach, strokes, transitions and way home as one motion.
         X_WT: Tile frame T in W, as segmented.
-        standoff: Nozzle to wall on the raster's strokes, m; each stroke has its own.
+        standoff: Nozzle to wall of the raster, m; each stroke has its own.
         nominal_thickness: Film that the raster aims at, m (wet).
         paint_volume: Paint that leaves the gun, m³.
-        skipped: Strokes, or parts of them, that the arm cannot do.
+        skipped: Infeasible strokes, or parts of them, with the reason.
     """
 
     strokes: tuple[Stroke, ...]

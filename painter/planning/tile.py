@@ -1,4 +1,4 @@
-"""The wall tile: where it is expected and how its grids are laid on it.
+"""The wall tile: its nominal pose and its grids.
 
 T has its origin at the tile's lower-left corner as seen by the robot, x right, y up, z
 out of the wall towards the robot. Grids over T have shape (ny, nx), row 0 at the
@@ -16,7 +16,7 @@ _R_WT_NOMINAL = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def nominal_tile_pose(tile: TileConfig) -> RigidTransform:
-    """Returns the tile's pose where the job expects it: plumb and square to the arm.
+    """Returns the pose at which the job expects the tile: plumb and square to the arm.
 
     Args:
         tile: Size and place of the tile; it is centred on the arm's base axis.
@@ -63,7 +63,7 @@ def grid_points(
         z: (ny, nx) m, in T, or one height for all.
 
     Returns:
-        p_TQs, (3, ny * nx) m, row by row; `X_WT @ p_TQs` puts them into W.
+        p_TQs, (3, ny * nx) m, row by row; `X_WT @ p_TQs` re-expresses them in W.
     """
     xs, ys = np.meshgrid(x, y)
     zs = np.broadcast_to(z, xs.shape)

@@ -1,4 +1,4 @@
-"""Zones in which the operator wants paint, or none."""
+"""Zones that the operator includes or excludes, and marks on a tile."""
 
 from collections.abc import Sequence
 
@@ -17,8 +17,8 @@ def in_zones(mask: BoolArray, cell: float, zones: Sequence[ZoneConfig]) -> BoolA
     Args:
         mask: (ny, nx) bool, True = to be painted.
         cell: Edge of a cell, m.
-        zones: Included cells are those inside any zone to include, if there is one,
-            and outside all zones to exclude; a cell's centre decides.
+        zones: A cell stays if its centre is inside any "include" zone, or there is
+            none, and outside all "exclude" zones.
 
     Returns:
         (ny, nx) bool.
@@ -28,7 +28,7 @@ def in_zones(mask: BoolArray, cell: float, zones: Sequence[ZoneConfig]) -> BoolA
 
 
 def points_in_zones(points_T: FloatArray, zones: Sequence[ZoneConfig]) -> BoolArray:
-    """Tells which points (k, 2), m, in T, zones leave to be painted; see `in_zones`."""
+    """Returns which points (k, 2), m, in T, zones leave to paint; see `in_zones`."""
     marked = np.ones(len(points_T), dtype=bool)
     included = [zone.corners for zone in zones if zone.kind == "include"]
     if included:
@@ -54,7 +54,7 @@ def marked_cells(
 
 
 def inside(corners_T: ArrayLike, points_T: FloatArray) -> BoolArray:
-    """Tells which points lie inside a mark.
+    """Returns which points lie inside a mark.
 
     Args:
         corners_T: (n, 2) m, in T: two opposite corners of a rectangle, or the three or
@@ -69,7 +69,7 @@ def inside(corners_T: ArrayLike, points_T: FloatArray) -> BoolArray:
     """
     corners = np.asarray(corners_T, dtype=np.float64).reshape(-1, 2)
     if len(corners) < 2:
-        raise ValueError(f"a mark has 2 or more corners, got {len(corners)}.")
+        raise ValueError(f"a mark must have 2 or more corners, got {len(corners)}.")
     if len(corners) == 2:
         within = (points_T >= corners.min(axis=0)) & (points_T <= corners.max(axis=0))
         return np.asarray(within.all(axis=1))

@@ -1,7 +1,7 @@
-"""The robot as a plant: what kinematics, limits and collision checks are read from.
+"""The robot as a plant: source of kinematics, limits and collision checks.
 
-Lengths, mounts and limits stand in the models alone; everything here is read from a
-plant that was made of them.
+Lengths, mounts and limits are defined in the models alone; everything here is read from
+a plant that is parsed from them.
 """
 
 import numpy as np
@@ -73,7 +73,7 @@ def GetArmKinematics(plant: MultibodyPlant) -> ArmKinematics:
         plant: Finalised, with the robot in it; may hold more.
 
     Raises:
-        ValueError: The robot is not the kind of arm that `ArmKinematics` describes.
+        ValueError: The robot is not an arm of the form that `ArmKinematics` describes.
     """
     context = plant.CreateDefaultContext()
     arm = plant.GetModelInstanceByName("arm")
@@ -100,13 +100,13 @@ def GetArmKinematics(plant: MultibodyPlant) -> ArmKinematics:
 
 
 class ArmTorques:
-    """What a motion takes of the joints: inverse dynamics of a plant.
+    """Joint torques of a motion: inverse dynamics of a plant.
 
     Gravity, inertia with that of the rotors, and the joints' viscous friction.
     """
 
     def __init__(self, plant: MultibodyPlant) -> None:
-        """Keeps a plant, finalised, in which the arm alone moves."""
+        """Takes a finalised plant in which only the arm moves."""
         self._plant = plant
         self._context = plant.CreateDefaultContext()
         self._forces = MultibodyForces(plant)
@@ -146,14 +146,14 @@ def MakeCollisionChecker(
 ) -> SceneGraphCollisionChecker:
     """Makes a checker of the robot against itself, its frame and the floor.
 
-    Its positions are the arm's five joints, base yaw first. A wall and what was mapped
-    are added by `AddCollisionShapeToBody(..., checker.plant().world_body(), ...)`, as
-    boxes, spheres, capsules or cylinders posed in W.
+    Its positions are the arm's five joints, base yaw first. Obstacles are added by
+    `AddCollisionShapeToBody(..., checker.plant().world_body(), ...)`, as boxes or
+    cylinders posed in W.
 
     Args:
         directives: Path or package:// URL of the model directives.
-        clearance: The robot nearer than this to anything else collides, m.
-        self_clearance: Two parts of the robot nearer than this collide, m.
+        clearance: Least distance of the robot from anything else, m.
+        self_clearance: Least distance between two parts of the robot, m.
         edge_step: Largest step between two checks along an edge, as the root of the
             sum of squares over the joints, rad.
     """

@@ -60,9 +60,9 @@ class ReachMapper:
         Args:
             distance: Of the wall from the base axis, m.
             shoulder_height: Of the shoulder axis over the floor, m; the frame's mast
-                is taken as it is modelled, and moves with the shoulder.
+                moves with the shoulder.
             step: Spacing of the points on the tile, m.
-            around: How far beyond the tile to look, m.
+            around: How far beyond the tile to compute, m.
         """
         raised = shoulder_height - self.arm.shoulder_height
         tile = placement(self._scenario.tile, distance=distance, raised=raised)

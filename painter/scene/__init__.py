@@ -1,4 +1,7 @@
-"""Scene descriptions: geometry for the simulator, truth for the figures."""
+"""Scene descriptions: geometry for the simulator, truth for the figures.
+
+A leaf: knows neither robot nor scenario; `painter.robot.true_scene` poses a scene in W.
+"""
 
 from painter.scene.config import Scene
 from painter.scene.load import dump_scene, load_scene, named_scenes

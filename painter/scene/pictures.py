@@ -13,7 +13,7 @@ from painter.scene.surface import cast_rays, is_paintable, surface_at, visible_s
 from painter.scene.texture import wall_picture
 from perception.ground import FloatArray
 
-# Colours of the truth picture: white is painted, everything else is kept clean.
+# Colours of the truth picture: white is to be painted, everything else is keep-out.
 KIND_COLORS = {
     SurfaceKind.NONE: "#2b2b2b",
     SurfaceKind.WALL: "#ffffff",
@@ -24,7 +24,7 @@ KIND_COLORS = {
 }
 # Pictures are drawn on a grid of this cell, m.
 _CELL = 0.005
-# Direction to the light in S, and the share of light that comes from everywhere.
+# Direction to the light in S, and the share of ambient light.
 _LIGHT = np.array([-0.45, 0.55, 0.70])
 _AMBIENT = 0.45
 # Steeper rises from cell to cell are drawn as steps.

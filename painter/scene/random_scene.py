@@ -1,4 +1,4 @@
-"""Scenes drawn from a seed: walls that a painter may well meet."""
+"""Random scenes: walls as a painter meets them, drawn from a seed."""
 
 import math
 
@@ -12,14 +12,14 @@ from painter.scene.config import (
     WallConfig,
 )
 
-# Kept between any two things on the wall, and between them and the tile's edge, m.
+# Least gap between two things on the wall, and between one and the tile's edge, m.
 _GAP = 0.06
 # Edge of the tile, m.
 _TILE = 2.0
-# Heights of objects over the wall: clear of the paper's 4 cm resolution, and low enough
-# that the gun at 0.30 m passes over them, m.
+# Heights of objects over the wall, m: more than the paper's 4 cm resolution, and low
+# enough that the gun at 0.30 m passes over them.
 _HEIGHTS = (0.05, 0.15)
-# A thing that finds no free place in so many tries is left out.
+# Tries to find a free place for a thing before it is left out.
 _TRIES = 100
 
 _COLORS = (
@@ -166,7 +166,7 @@ def _find_place(
     y_range: tuple[float, float],
     taken: list[_Box],
 ) -> tuple[float, float] | None:
-    """Draws a lower-left corner clear of what is taken, and takes it; m in S."""
+    """Draws a lower-left corner clear of all in `taken`, and adds it there; m in S."""
     for _ in range(_TRIES):
         x, y = round(rng.uniform(*x_range), 3), round(rng.uniform(*y_range), 3)
         box = (x, x + width, y, y + height)

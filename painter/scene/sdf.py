@@ -15,7 +15,7 @@ ElementTree.register_namespace("drake", "http://drake.mit.edu")
 
 
 def wall_pose(scene: Scene, X_WT_nominal: RigidTransform) -> RigidTransform:
-    """Returns where the scene really stands, given where the job expects the tile.
+    """Returns the true pose of the scene, given where the job expects the tile.
 
     Args:
         scene: The scene; its base error moves the wall about and along W's axes.
@@ -33,15 +33,14 @@ def wall_pose(scene: Scene, X_WT_nominal: RigidTransform) -> RigidTransform:
 def scene_sdf(scene: Scene, folder: Path | None = None) -> str:
     """Returns the scene as SDF: a model "scene" whose one link "scene" has frame S.
 
-    The link is to be welded to the world at `wall_pose`. Glass is seen only by a
-    renderer named "with_glass", everything else by all renderers; all but the room
+    The caller welds the link to the world at `wall_pose`. Only a renderer named
+    "with_glass" draws glass; all renderers draw everything else. All but the room
     behind the glass has collision geometry.
 
     Args:
         scene: The scene.
-        folder: Existing folder for the mesh and picture of a textured wall, which the
-            SDF points to and which has to stay as long as they are drawn. Without a
-            folder the wall has its plain colour.
+        folder: Existing folder for the mesh and picture of a textured wall; the SDF
+            points to them, so it must outlive the renderer. None = a plain wall.
 
     Returns:
         The SDF document.

@@ -39,8 +39,7 @@ class Solid:
 
     Attributes:
         name: Unique in its scene.
-        kind: What it is; NONE is the room behind the glass, which is never the nearest
-            surface.
+        kind: What it is; NONE is the room behind the glass, which counts as no surface.
         shape: "box", "cylinder" or "sphere", centred on its own frame P.
         size: Box: edges, m; cylinder: diameter and length along P's z, m; sphere:
             diameter, m.

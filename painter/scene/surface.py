@@ -14,8 +14,8 @@ from perception.ground import BoolArray, FloatArray, FrozenValue
 
 KindArray = npt.NDArray[np.uint8]
 
-# Two boxes that share a face in the drawing must not leave a gap of rounding between
-# them for a ray to slip through, m.
+# Boxes that share a face must not leave a gap of rounding between them that a ray could
+# slip through, m.
 _SEAM = 1e-9
 
 

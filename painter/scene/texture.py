@@ -18,7 +18,7 @@ _PIXELS = 300.0
 _BRICK = (0.250, 0.083)
 _JOINT = (0.010, 0.012)
 _MORTAR = (0.70, 0.68, 0.64)
-# The picture of a wall is always the same; it is not part of a run's chance.
+# The picture of a wall is always the same, whatever the seed of a run.
 _SEED = 435
 
 

@@ -3,8 +3,8 @@
 The arm has a yaw at the base, pitches at shoulder, elbow and wrist, and a yaw at the
 wrist, with pitch and yaw of the wrist in one point (the wrist centre, origin of L).
 Pitches add up, so that R_WL = Rz(q1) Ry(q2 + q3 + q4) Rz(q5), and both the gun G and
-the camera C look along L x. A pose is asked for by a point and that axis: the roll
-about it cannot be chosen, the arm has five joints.
+the camera C look along L x. A target is a point and the direction of that axis: with
+five joints the roll about it cannot be chosen.
 """
 
 from collections.abc import Callable
@@ -16,12 +16,11 @@ from pydrake.math import RigidTransform
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
 NQ = 5  # Joints of the arm.
-# How far X_LG and X_LC may be from the form that the closed-form inverse needs.
+# Largest error of X_LG and X_LC against the form that the closed-form inverse needs.
 _MOUNT_TOLERANCE = 1e-9
 
-
-# Joint torques (n, 5), N m, that positions, velocities and accelerations (n, 5) each,
-# rad and s, take.
+# Joint torques (n, 5), N m, for positions, velocities and accelerations, each (n, 5),
+# rad and s.
 TorqueModel = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 # Nozzle (n, 3) in W, m, at joint angles (n, 5), rad.
 NozzleModel = Callable[[FloatArray], FloatArray]
@@ -37,9 +36,9 @@ class ArmLimits(FrozenValue):
         v_max: (5,) rad/s.
         a_max: (5,) rad/s².
         effort_max: (5,) N m at the joint.
-        torques: What a motion takes of them; None = not looked at.
-        nozzle_speed: Most speed of the nozzle in W, m/s.
-        nozzle: Where it is; None = its speed is not looked at.
+        torques: Joint torques of a motion; None = not checked.
+        nozzle_speed: Highest speed of the nozzle in W, m/s.
+        nozzle: Position of the nozzle; None = its speed is not checked.
     """
 
     q_min: FloatArray
@@ -52,7 +51,7 @@ class ArmLimits(FrozenValue):
     nozzle: NozzleModel | None = None
 
     def contains(self, q: FloatArray) -> BoolArray:
-        """Tells which rows of `q` (n, 5), rad, are finite and within the limits."""
+        """Returns which rows of `q` (n, 5), rad, are finite and within the limits."""
         with np.errstate(invalid="ignore"):
             inside: BoolArray = np.all((q >= self.q_min) & (q <= self.q_max), axis=-1)
         return inside
@@ -91,8 +90,8 @@ class ArmKinematics(FrozenValue):
             lateral = abs(X_LF.translation()[1])
             if axis_error > _MOUNT_TOLERANCE or lateral > _MOUNT_TOLERANCE:
                 raise ValueError(
-                    f"{name} must look along L x from a point with L y = 0; its axis "
-                    f"is off by {axis_error:.2g}, its point by {lateral:.2g} m."
+                    f"{name} must have its z axis along L x and its origin at L y = 0, "
+                    f"got an axis off by {axis_error:.2g} and L y = {lateral:.2g} m."
                 )
 
     @property
@@ -164,18 +163,18 @@ class ArmKinematics(FrozenValue):
             elbow: +1 for q3 >= 0 (the elbow above the line from shoulder to wrist, for
                 an arm that faces its work), -1 for q3 <= 0.
             shoulder: +1 turns the base towards the wrist, -1 away from it (the arm
-                leans over backwards).
+                reaches over backwards).
 
         Returns:
             (n, 5) rad, in (-pi, pi], wrist yaw within +-pi/2; rows of NaN where the
-            point is out of reach. Joint limits are not looked at.
+            point is out of reach. Joint limits are not checked.
         """
         return self._solve(p_WG, axis_W, self.X_LG, elbow, shoulder)
 
     def solve_camera(
         self, p_WC: FloatArray, axis_W: FloatArray, *, elbow: int = 1, shoulder: int = 1
     ) -> FloatArray:
-        """The same as `solve` for the depth camera: its origin and viewing axis."""
+        """The same as `solve` for the depth camera, by its origin and viewing axis."""
         return self._solve(p_WC, axis_W, self.X_LC, elbow, shoulder)
 
     def gun_jacobian(self, q: FloatArray) -> FloatArray:
@@ -205,10 +204,10 @@ class ArmKinematics(FrozenValue):
         return jacobian
 
     def travel(self, q: FloatArray) -> FloatArray:
-        """Returns how far the arm's axes move from row to row, nozzle and camera too.
+        """Returns the longest way of elbow, wrist, nozzle and camera from row to row.
 
-        Of a straight link no point moves farther than the end that moves farther: each
-        is the same mean of both ends before and after.
+        No point of a straight link moves farther than the farther moving one of its
+        ends, since it is the same weighted mean of both before and after.
 
         Args:
             q: (n, 5) rad.
@@ -298,13 +297,13 @@ class ArmKinematics(FrozenValue):
         q = np.empty((len(yaw), 5))
         q[:, 0], q[:, 1], q[:, 2] = yaw, q2, q3
         q[:, 3], q[:, 4] = pitch - q2 - q3, wrist_yaw
-        # Whatever is not finite comes into the elbow.
+        # All that is not finite shows in the elbow.
         unreached = np.isnan(q3)
         if unreached.any():
             q[unreached] = np.nan
         below = np.pi - q
         around = (below < 0.0) | (below >= 2.0 * np.pi)
-        # Few turn more than half way round, and the remainder of all takes its time.
+        # Few angles need it, and the remainder of all would take long.
         if around.any():
             below[around] = np.mod(below[around], 2.0 * np.pi)
         wrapped: FloatArray = np.pi - below

@@ -1,4 +1,4 @@
-"""Where the base should stand before a tile, from what it reaches from there."""
+"""Proposes where the base stands in front of a tile, from what the arm reaches."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ class Placement(FrozenValue):
     """A proposed distance of the wall from the base axis.
 
     Attributes:
-        distance: m.
-        nearest: Nearest distance at which as much is reached, m.
-        farthest: Farthest, m.
+        distance: Wall to base axis, m.
+        nearest: Least distance with the same reach, m.
+        farthest: Greatest distance with the same reach, m.
         spray_share: Share of the tile that can be sprayed.
         scan_share: Share of the tile and its margin that can be seen.
     """
@@ -34,12 +34,12 @@ def propose_distance(
 ) -> Placement:
     """Proposes the distance with most reach, in the middle of the range that has it.
 
-    Spraying comes first, seeing second: what was not seen counts as wall, what cannot
-    be sprayed stays bare.
+    Spraying counts before seeing: what is not seen counts as wall, but what cannot be
+    sprayed stays bare.
 
     Args:
-        reach_at: What is reached with the wall at a distance, m.
-        distances: To be tried, ascending, m.
+        reach_at: Returns the reach with the wall at a distance, m.
+        distances: Distances to try, ascending, m.
 
     Raises:
         ReachError: Nothing of the tile is reached from any of them.
@@ -51,11 +51,11 @@ def propose_distance(
     best = max(shares)
     if best[0] <= 0.0:
         raise ReachError(
-            f"placement: nothing of the tile is reached with the wall "
+            f"placement: the arm reaches no point of the tile with the wall "
             f"{distances[0]:.2f} to {distances[-1]:.2f} m from the base axis.",
             code="PNT-REACH-001",
         )
-    # The longest run of equals leaves most room for an error of the base.
+    # The middle of the longest run of equals tolerates the largest error of the base.
     good = np.array([share == best for share in shares])
     bounds = np.flatnonzero(np.diff(good, prepend=False, append=False)).reshape(-1, 2)
     first, end = max(bounds.tolist(), key=lambda run: run[1] - run[0])

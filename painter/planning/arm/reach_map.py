@@ -1,9 +1,9 @@
-"""Which part of a tile a base placement reaches, to spray it and to see it.
+"""Reach map: the parts of a tile that a base placement can spray and see.
 
 A placement is the wall's distance from the base axis and the shoulder's height over
-the floor. A point of the tile is sprayed if the nozzle can stand square before it at
-the spray stand-off; it is seen if it lies in a picture from a place where the camera
-can stand square before the wall at the scan distance. Both with the elbow up, within
+the floor. A point of the tile is sprayed if the nozzle reaches the pose square to it at
+the spray stand-off. It is seen if it lies in a picture from a pose of the camera that
+is square to the wall at the scan distance and reached. Both with the elbow up, within
 the joint limits and free of collisions.
 """
 
@@ -22,14 +22,14 @@ from perception.ground import BoolArray, FloatArray, FrozenValue
 
 @dataclass(frozen=True, eq=False)
 class ReachTask(FrozenValue):
-    """What the arm is asked to do before a tile.
+    """What the arm has to reach at a tile.
 
     Attributes:
         standoff: Nozzle to wall, m.
         scan_distance: Camera to wall, m.
         picture_width: Width of wall in one picture at that distance, m.
         picture_height: Height of the same, m.
-        margin: The pictures are to reach this far beyond the tile's edge, m.
+        margin: How far pictures have to reach beyond the tile's edge, m.
     """
 
     standoff: float
@@ -60,16 +60,16 @@ class ReachTask(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class TileReach(FrozenValue):
-    """What one placement reaches of a tile; row 0 at the bottom.
+    """The reach from one placement; row 0 at the bottom.
 
     Attributes:
-        x: (nx,) m, columns in T, over the tile and what is around it.
+        x: (nx,) m, columns in T, over the tile and around it.
         y: (ny,) m, rows in T, likewise.
         on_tile: (ny, nx); True on the tile.
-        to_see: (ny, nx); True on the tile and the margin that pictures are to reach.
-        sprayed: (ny, nx); the nozzle can stand before the point.
-        camera_at: (ny, nx); the camera can stand before the point.
-        seen: (ny, nx); the point is in a picture from such a place.
+        to_see: (ny, nx); True on the tile and the margin of the pictures.
+        sprayed: (ny, nx); the nozzle reaches the pose square to the point.
+        camera_at: (ny, nx); the camera reaches the pose square to the point.
+        seen: (ny, nx); the point is in a picture from such a pose.
     """
 
     x: FloatArray
@@ -107,10 +107,10 @@ def tile_reach(
         arm: Kinematics, in W.
         limits: Joint limits.
         tile: The tile; its distance and height over the floor are the placement.
-        task: What is to be done.
-        is_free: Tells which rows of positions (n, 5), rad, are free of collisions.
+        task: Stand-offs and sizes of pictures.
+        is_free: Returns which rows of positions (n, 5), rad, are free of collisions.
         step: Spacing of the points, m; points lie on the tile's edges.
-        around: How far beyond the tile to look, m; at least the task's margin.
+        around: How far beyond the tile to compute, m; at least the task's margin.
     """
     around = max(around, task.margin)
     x, y = _ticks(tile.width, around, step), _ticks(tile.height, around, step)
@@ -140,7 +140,7 @@ def tile_reach(
 
 
 def placement(tile: TileConfig, *, distance: float, raised: float) -> TileConfig:
-    """Returns the tile as an arm sees it that stands elsewhere.
+    """Returns the tile in the axes of an arm that stands elsewhere.
 
     Args:
         tile: The tile before the arm as modelled.

@@ -1,4 +1,4 @@
 """The film that spray leaves: deposition, film on a tile, its cost, its preview.
 
-Knows strokes as values; where they lie is decided in `strokes`.
+Strokes are values here; `strokes` decides where they lie.
 """

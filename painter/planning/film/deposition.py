@@ -1,4 +1,4 @@
-"""Film that an elliptical double-beta fan leaves behind, in closed form.
+"""Film of an elliptical double-beta fan, in closed form.
 
 With the gun square on a wall at stand-off d, fan half axes a (long, T x) and b (short,
 T y), the film grows at the rate
@@ -129,8 +129,8 @@ def predicted_film(
 ) -> FloatArray:
     """Returns the film that strokes along T y leave on a flat wall.
 
-    Each stroke's integral is exact, its ends included: a point at y has seen the share
-    of the fan's thickness that passed over it.
+    Each stroke's integral is exact, its ends included: a point at y gets the share of
+    the fan's thickness that passed over it.
 
     Args:
         strokes: Strokes along T y, either way.

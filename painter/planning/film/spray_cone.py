@@ -1,8 +1,8 @@
 """Where a fan's paint lands on a real surface: rays of equal volume.
 
 The elliptical double-beta fan of `painter.planning.film.deposition` is sampled by rays
-that each carry the same volume; a ray lands on the first thing in its way, so whatever
-stands out shades what is behind it, and no paint is lost or made.
+of equal volume. A ray lands on the first surface in its way, so whatever stands out
+shades what is behind it, and volume is conserved.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ class SprayCone:
 
     Attributes:
         directions_G: (3, n) along each ray, in G, of length 1 along the spray axis.
-        fractions: (n,) when each ray leaves, as a share of the motion from 0 to 1.
+        fractions: (n,) share of the motion, 0 to 1, at which each ray leaves.
     """
 
     def __init__(self, tip: TipConfig, *, ray_count: int = 512) -> None:
@@ -86,7 +86,7 @@ class SpraySurface:
     """
 
     def __init__(self, height: FloatArray, *, cell: float, origin: FloatArray) -> None:
-        """Takes the surface.
+        """Makes the surface from a height field.
 
         Args:
             height: (ny, nx) m along S z, row 0 at the lowest y; NaN = nothing there.
@@ -132,8 +132,8 @@ class SpraySurface:
         missed = int(np.count_nonzero(~falls))
         if not falls.any():
             return np.zeros(0, dtype=np.int64), np.zeros(0), missed
-        # Only heights below the rays matter: narrow them from the whole surface's to
-        # those of the cells that the rays cross.
+        # Only heights below the rays matter: narrow the bounds from those of the whole
+        # surface to those of the cells that the rays cross.
         box = self._crossed(origins, directions, *self._bounds)
         low, high = _bounds(self._height[box])
         if low == high and np.isfinite(self._height[box]).all():
@@ -230,7 +230,7 @@ class SpraySurface:
                 level = np.abs(self._height[row, column] - top) <= self.cell
                 cells.append((row - 1) * self.shape[1] + column - 1)
                 shares.append(np.where(level, across * along, 0.0))
-        # What a neighbour on another level would have got stays on the hit cell.
+        # The share of a neighbour on another level stays on the hit cell.
         cells.append((cell[1] - 1) * self.shape[1] + cell[0] - 1)
         shares.append(1.0 - np.sum(shares, axis=0))
         given = np.ravel(shares) > 0.0

@@ -1,4 +1,4 @@
 """Where strokes lie, how fast and with how much paint; their order.
 
-Fits strokes to the film; knows neither arm nor time between strokes.
+Fits strokes to the film. No arm: `program` finds the transitions.
 """

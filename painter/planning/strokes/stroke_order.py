@@ -1,8 +1,8 @@
-"""Order and direction of strokes: the least time between them, ends fixed.
+"""Order and direction of strokes: least time of transitions, both ends fixed.
 
-A link between two strokes is taken as the quickest motion of a point whose acceleration
-along each axis is bounded. That leaves joints and obstacles out, but it ranks orders as
-the finished motion does: what costs time is turning about and going back.
+A transition is taken as the quickest motion of a point whose acceleration along each
+axis is bounded. That leaves joints and obstacles out, but it ranks orders as the
+finished motion does: turning about and going back are what costs time.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from perception.ground import FloatArray
 # m/s², along each axis; with the arm of the models a U-turn at 0.6 m/s between lines
 # 0.13 m apart then takes the 0.5 s that it takes in finished motions.
 _ACCELERATION = 2.5
-_LONGEST_RUN = 3  # Strokes that are moved together to another place in the order.
+_LONGEST_RUN = 3  # Strokes that are moved together within the order.
 _GAIN = 1e-6  # s; less is rounding.
 
 
@@ -24,27 +24,27 @@ def order_strokes(
 ) -> tuple[Stroke, ...]:
     """Orders and turns strokes so that the gun loses little time between them.
 
-    Starts from the given order and takes any better one that comes from turning a run
-    of strokes about, or from moving a short run elsewhere, until there is none.
+    Starts from the given order and takes any better one that results from reversing a
+    run of strokes, or from moving a short run elsewhere, until there is none.
 
     Args:
         strokes: In any order.
-        p_TG_start: (3,) m, nozzle in T where it rests before.
-        p_TG_end: (3,) m, nozzle in T where it rests afterwards.
+        p_TG_start: (3,) m, nozzle in T at rest before the strokes.
+        p_TG_end: (3,) m, nozzle in T at rest after them.
 
     Returns:
         The same strokes, some of them in the other direction.
     """
     if not strokes:
         return ()
-    cost = _link_times(strokes, p_TG_start, p_TG_end)
+    cost = _transition_times(strokes, p_TG_start, p_TG_end)
     count = len(strokes)
-    # Stroke k forwards is 2 k, backwards 2 k + 1; the two rests come last.
+    # Stroke k forwards is 2 k, backwards 2 k + 1; the two rest poses come last.
     order = [2 * count, *range(0, 2 * count, 2), 2 * count + 1]
     rows = cost.tolist()  # Single numbers are quicker to take from lists.
     better = True
     while better:
-        better = _turn_runs(order, rows) or _move_runs(order, cost)
+        better = _reverse_runs(order, rows) or _move_runs(order, cost)
     return tuple(
         reversed_stroke(strokes[k // 2]) if k % 2 else strokes[k // 2]
         for k in order[1:-1]
@@ -54,8 +54,8 @@ def order_strokes(
 def transition_time(
     strokes: Sequence[Stroke], p_TG_start: FloatArray, p_TG_end: FloatArray
 ) -> float:
-    """Returns the estimated time between strokes in the order given, s."""
-    cost = _link_times(strokes, p_TG_start, p_TG_end)
+    """Returns the estimated time of all transitions in the order given, s."""
+    cost = _transition_times(strokes, p_TG_start, p_TG_end)
     count = len(strokes)
     order = np.array([2 * count, *range(0, 2 * count, 2), 2 * count + 1])
     return float(cost[order[:-1], order[1:]].sum())
@@ -66,7 +66,7 @@ def reversed_stroke(stroke: Stroke) -> Stroke:
     return stroke.replace(start_T=stroke.end_T, end_T=stroke.start_T)
 
 
-def _link_times(
+def _transition_times(
     strokes: Sequence[Stroke], p_TG_start: FloatArray, p_TG_end: FloatArray
 ) -> FloatArray:
     """Returns the time (2 n + 2, 2 n + 2), s, from each oriented stroke to each."""
@@ -108,8 +108,8 @@ def _least_time(gap: FloatArray, v0: FloatArray, v1: FloatArray) -> FloatArray:
     return np.asarray(np.where(np.isfinite(least), least, cruise))
 
 
-def _turn_runs(order: list[int], cost: list[list[float]]) -> bool:
-    """Turns runs of strokes about where that saves time; True if one was."""
+def _reverse_runs(order: list[int], cost: list[list[float]]) -> bool:
+    """Reverses runs of strokes where that saves time; True if any was."""
     found = False
     for i in range(1, len(order) - 1):
         from_before = cost[order[i - 1]]

@@ -147,8 +147,14 @@ def test_jacobian_is_the_derivative_of_the_nozzle_pose():
     ("change", "message"),
     [
         ({"forearm": 0.0}, "forearm must be > 0 m"),
-        ({"X_LG": RigidTransform(R_AHEAD, [0.3, 0.01, 0.0])}, "X_LG must look along"),
-        ({"X_LC": RigidTransform([0.2, 0.0, 0.1])}, "X_LC must look along"),
+        (
+            {"X_LG": RigidTransform(R_AHEAD, [0.3, 0.01, 0.0])},
+            "X_LG must have its z axis along L x",
+        ),
+        (
+            {"X_LC": RigidTransform([0.2, 0.0, 0.1])},
+            "X_LC must have its z axis along L x",
+        ),
     ],
 )
 def test_arms_of_another_form_are_refused(change, message):

@@ -148,7 +148,7 @@ def test_verification_finds_a_stroke_that_is_out_of_time(robot, program):
                 "start_T": s.start_T + [0.003, 0],
                 "end_T": s.end_T + [0.003, 0],
             },
-            "place across x is 0.003",
+            "position across x is 0.003",
         ),
         (lambda s: {"end_T": s.part(0.0, 1.01).end_T}, "end is 0.0"),
     ],
@@ -171,7 +171,7 @@ def test_verification_names_the_stroke_that_is_not_as_it_should(
 def test_verification_finds_a_motion_that_is_too_fast(robot, program):
     motion = program.motion
     fast = Motion(motion.time / 2, motion.q, motion.v * 2, motion.spray_on / 2)
-    with pytest.raises(MotionLimitError, match=r"rush: \w+ of .* allowed is"):
+    with pytest.raises(MotionLimitError, match=r"rush: velocity of .* the limit is"):
         verify_motion(
             fast,
             kinematics=robot.kinematics,

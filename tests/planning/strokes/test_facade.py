@@ -150,5 +150,5 @@ def test_distance_is_in_the_middle_of_the_range_that_reaches_most():
 
 
 def test_a_tile_that_nothing_reaches_is_an_error():
-    with pytest.raises(ReachError, match="nothing of the tile"):
+    with pytest.raises(ReachError, match="reaches no point of the tile"):
         propose_distance(lambda d: reach_with(0.0), [1.0, 2.0])
