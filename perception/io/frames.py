@@ -18,6 +18,7 @@ from perception.ground import FloatArray, FrozenValue
 from perception.io.camera_file import (
     CAMERA_FILE,
     INTRINSICS_FILE,
+    RecordedCamera,
     read_camera,
     write_camera,
 )
@@ -115,14 +116,14 @@ def open_recording(
     """
     if not folder.is_dir():
         raise CloudReadError(f"{folder}: no such folder.", code="PNT-FRAMES-014")
-    intrinsics, unit_mm = _read_camera(folder)
-    if (folder / "depth.txt").is_file():
+    tum = (folder / "depth.txt").is_file()
+    camera = _find_camera(folder, 1.0 / DEPTH_UNITS_PER_M if tum else 0.001)
+    if tum:
         source = poses or folder / ARM_FILE
         stamped = None
         if use_poses and (poses is not None or source.is_file()):
             stamped = read_poses(source)
         entries = _tum_entries(folder, stamped)
-        unit_mm = unit_mm or 1000.0 / DEPTH_UNITS_PER_M
     else:
         entries = _numbered_entries(folder, use_poses)
     if not entries:
@@ -131,7 +132,7 @@ def open_recording(
             " or depth_N.png.",
             code="PNT-FRAMES-015",
         )
-    return Recording(intrinsics, unit_mm or 1.0, tuple(entries))
+    return Recording(camera.intrinsics, 1000.0 * camera.depth_scale, tuple(entries))
 
 
 def write_recording(
@@ -219,28 +220,25 @@ def _read_image(path: Path, mode: int) -> npt.NDArray[Any]:
     return np.asarray(image)
 
 
-def _read_camera(folder: Path) -> tuple[CameraIntrinsics, float | None]:
-    for name in (CAMERA_FILE, INTRINSICS_FILE):
-        for parent in (folder, folder.parent):
-            if (parent / name).is_file():
-                return _checked_camera(parent / name)
-    raise CloudReadError(
-        f"{folder}: no {CAMERA_FILE} (width, height, fx, fy, cx, cy).",
-        code="PNT-FRAMES-020",
-    )
-
-
-def _checked_camera(path: Path) -> tuple[CameraIntrinsics, float | None]:
-    camera = read_camera(path)
-    intrinsics, scale = camera.intrinsics, camera.depth_scale_m_per_unit
+def _find_camera(folder: Path, depth_scale: float) -> RecordedCamera:
+    """Reads the camera of a folder, beside its pictures or one level up."""
+    names = (CAMERA_FILE, INTRINSICS_FILE)
+    paths = [parent / name for name in names for parent in (folder, folder.parent)]
+    path = next((path for path in paths if path.is_file()), None)
+    if path is None:
+        raise CloudReadError(
+            f"{folder}: no {CAMERA_FILE} (width, height, fx, fy, cx, cy).",
+            code="PNT-FRAMES-020",
+        )
+    camera = read_camera(path, depth_scale=depth_scale)
     for name, side in (("cx", "width"), ("cy", "height")):
-        value, size = getattr(intrinsics, name), getattr(intrinsics, side)
+        value, size = (getattr(camera.intrinsics, key) for key in (name, side))
         if not 0.0 < value < size:
             raise CloudReadError(
                 f"{path}: {name} must be > 0 and < {side} {size}, got {value}.",
                 code="PNT-FRAMES-023",
             )
-    return intrinsics, None if scale is None else 1000.0 * scale
+    return camera
 
 
 def _read_list(path: Path) -> tuple[FloatArray, list[Path]]:

@@ -1,4 +1,4 @@
-"""PLY files of points: their header, and how they are written.
+"""PLY files of points: parses their header and writes them.
 
 Source: Turk, "The PLY polygon file format", 1994, and the type names with bit sizes
 that newer writers use.
@@ -29,18 +29,7 @@ _TYPES = {
     "float": "f4",
     "double": "f8",
 }
-_SIZED_TYPES = {
-    "int8": "i1",
-    "uint8": "u1",
-    "int16": "i2",
-    "uint16": "u2",
-    "int32": "i4",
-    "uint32": "u4",
-    "float32": "f4",
-    "float64": "f8",
-    "int64": "i8",
-    "uint64": "u8",
-}
+_SIZED_TYPES = {np.dtype(kind).name: kind for kind in (*_TYPES.values(), "i8", "u8")}
 _FORMS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 

@@ -173,11 +173,15 @@ def test_distortion_is_taken_off(tmp_path):
         (np.zeros((3, 4), np.uint16), CAMERA, "no points"),
         (np.zeros((3, 4), np.uint8), CAMERA, "expected 16-bit"),
         (np.ones((4, 3), np.uint16), CAMERA, "image is 3 x 4 px, .* is for 4 x 3 px"),
-        (np.ones((3, 4), np.uint16), CAMERA | {"fx": -1.0}, "fx must be > 0, got -1.0"),
+        (
+            np.ones((3, 4), np.uint16),
+            CAMERA | {"fx": -1.0},
+            "fx must be > 0 px, got -1.0",
+        ),
         (
             np.ones((3, 4), np.uint16),
             {"width": 4},
-            "height must be a whole number, got None",
+            "height must be > 0 px, got None",
         ),
         (np.ones((3, 4), np.uint16), [1, 2], "expected a JSON object"),
         (
@@ -185,6 +189,13 @@ def test_distortion_is_taken_off(tmp_path):
             CAMERA | {"distortion_k1k2p1p2k3": [0.1]},
             "must be 5 numbers",
         ),
+        (
+            np.ones((3, 4), np.uint16),
+            CAMERA | {"distortion_k1k2p1p2k3": 0.1},
+            "not a camera",
+        ),
+        (np.ones((3, 4), np.uint16), CAMERA | {"cx": "1"}, "cx must be finite px"),
+        (np.ones((3, 4), np.uint16), CAMERA | {"fy": 10**400}, "not a camera"),
     ],
 )
 def test_unusable_depth_images_are_refused(tmp_path, depth, camera, message):
@@ -200,5 +211,5 @@ def test_missing_or_damaged_depth_files_are_refused(tmp_path):
     with pytest.raises(CloudReadError, match=r"depth\.png: cannot read the picture"):
         read_depth(image, camera)
     camera.write_text("{")
-    with pytest.raises(CloudReadError, match=r"camera\.json: not JSON"):
+    with pytest.raises(CloudReadError, match=r"camera\.json: not a camera"):
         read_depth(image, camera)

@@ -86,7 +86,7 @@ def test_poses_that_are_none_are_refused_by_line(tmp_path):
     ("name", "text", "message"),
     [
         ("camera.json", None, "no camera.json"),
-        ("camera.json", '{"width": 64}', "height must be a whole number"),
+        ("camera.json", '{"width": 64}', "height must be > 0 px"),
         (
             "camera.json",
             '{"width": 64, "height": 48, "fx": 50, "fy": 50, "cx": 319.5, "cy": 24}',
