@@ -5,7 +5,7 @@ from typing import Any
 
 
 class CodedError(Exception):
-    """An error that a person is told in one line; the base of all of the project's own.
+    """Base of the project's errors; its message is one line for the user.
 
     Attributes:
         code: Stable name of what went wrong, "PNT-AREA-NNN", one for each place that

@@ -1,4 +1,4 @@
-"""What every room stands on: frozen values, array types, checks.
+"""What every room uses: frozen values, array types, checks.
 
 NumPy alone.
 """

@@ -52,8 +52,8 @@ def segment_wall(
     wall = wall_on_plane(found.planes[number], X_WT_expected, tile, total=total)
     coarse = segment_tile(found, wall, number + 1, tile, config=config).segmentation
     counts, variances = surface_map.counts, surface_map.variances
-    # The counts of a map tell outliers. On its even grid the statistical filter takes
-    # the rows along edges for outliers, and these rows say where the edges are.
+    # Counts show the outliers of a map. On its even grid the statistical filter would
+    # drop the rows along edges, and these rows give the position of the edges.
     real = np.ones_like(found.kept) if counts.size else found.kept
     used = np.flatnonzero(finite_points(surface_map.p_WQs))[real]
     points = surface_map.replace(

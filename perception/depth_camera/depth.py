@@ -62,7 +62,9 @@ class CameraIntrinsics:
             ValueError: The stream is distorted.
         """
         if any(lens.coeffs):
-            raise ValueError(f"its depth is distorted ({lens.model}), not rectified")
+            raise ValueError(
+                f"the depth stream is distorted ({lens.model}), not rectified"
+            )
         return cls(
             fx=lens.fx,
             fy=lens.fy,
@@ -119,11 +121,11 @@ class CameraIntrinsics:
 def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolArray:
     """Finds the pixels whose depth can be trusted.
 
-    A block matcher makes the near side of a depth edge grow by half its window, and
-    puts flying pixels between the two sides. So near pixels within half of
+    A block matcher grows the near side of a depth edge by half its window and puts
+    flying pixels between the two sides. So near pixels within half of
     `config.edge_window` of farther ones are dropped, and far pixels next to a nearer
-    one. A farther one that stands alone is a flying pixel itself, and no edge. Pixels
-    without depth count as what lies to their left: the shadow that hides them from the
+    one. A single farther pixel is a flying pixel itself and makes no edge. Pixels
+    without depth take the depth on their left: the occlusion that hides them from the
     right imager begins at the far side, which is on the left.
 
     Args:
@@ -141,7 +143,7 @@ def usable_pixels(depth_mm: npt.NDArray[np.uint16], config: MapConfig) -> BoolAr
     # `edge_step` is in 1/m, depth in mm.
     step = np.float32(config.edge_step / 1000)
     jump = np.minimum(np.float32(config.edge_jump) * depth, step * depth**2)
-    # What is left of far areas has lost a pixel along its edges, and gets it back.
+    # The minimum has eroded far areas by a pixel along their edges; undo that.
     far = moving_max(moving_min(depth, 3), config.edge_window + 2)
     usable: BoolArray = seen & (far - depth <= jump)
     usable &= depth - moving_min(depth, 3) <= jump

@@ -14,7 +14,7 @@ _LEAST_AREA = 0.02
 _RECTANGLE_FIT = 0.92
 """Overlap (IoU) of region and rectangle from which it is called one."""
 _TURNS_DEG = sorted(np.linspace(-3.0, 3.0, 13), key=abs)
-"""Windows stand plumb; tile and wall are turned by a degree or two at most."""
+"""Windows are plumb; tile and wall are turned by a degree or two at most."""
 _BETTER = 1e-3  # A larger turn must fit better by so much.
 _CLOSE = 2  # Cells: seams between frame, glass and shadow.
 _SQUARE = np.ones((3, 3), dtype=np.bool_)

@@ -1,8 +1,8 @@
 """Straight outlines: parts of the tile that are rectangles get the sides of one.
 
-Most of what hangs on a wall or is let into it is a rectangle. Its corners are what the
-votes of points round off; and its side, drawn through all points along it, is known
-much better than any cell's share of it.
+Most things on a wall or set into it are rectangles. Votes of points round off their
+corners; and a side, fitted to all points along it, is known much better than from the
+votes of single cells.
 """
 
 import dataclasses
@@ -21,9 +21,9 @@ _LEAST_CELLS = 9
 _FIT = 0.85
 """Overlap (IoU) of part and rectangle from which the part may be one."""
 _BAND = 1.5
-"""Points so near to a side, cells, say where it is."""
+"""Distance from a side of the points that it is fitted to, cells."""
 _DOUBT = 1.0
-"""Cells whose centres are so near to a side are decided by it, cells."""
+"""Distance from a side of the centres of cells that it decides, cells."""
 _TURNS = np.deg2rad([0.5, 0.25, 0.12, 0.06])
 """Tried to both sides of the best turn so far, first that which fits the cells best."""
 _BETTER = 0.9
@@ -58,7 +58,7 @@ def straighten(level: BoolArray, votes: Votes, *, cell: float) -> BoolArray:
         corners, _, fit = fit_rectangle(region, 1.0)
         if fit < _FIT:
             continue
-        # What belongs to another part says nothing of this one.
+        # Cells of another part are not evidence for this one.
         near = ((owner == 0) | (owner == number)) & _near(p_TQs, window)
         start = _Rectangle.of(corners)
         near[near] = np.abs(start.inside(p_TQs[:, near])) <= 2.0 * _BAND

@@ -1,4 +1,4 @@
-"""Beyond the paper: the mask by steps against the wall's own surface, with reasons."""
+"""Beyond the paper: a mask by steps from the wall's own surface, with reasons."""
 
 import dataclasses
 import functools
@@ -27,9 +27,9 @@ Grid = TypeVar("Grid", BoolArray, IntArray, FloatArray)
 _SQUARE = np.ones((3, 3), dtype=np.bool_)
 _SPLITS = (2, 4)  # Least and most sub-cells along a cell's edge.
 _MAJORITY = 0.58
-"""Share of votes from which a cell is wall: to paint a thing is worse than to leave a
-strip of wall, and its edge is known to a fraction of the spacing of points."""
-_GAP_CONFIDENCE = 0.5  # Of what is only filled in between points.
+"""Share of votes from which a cell is wall: overspray on a thing is worse than a bare
+strip of wall, and edges are known to a fraction of the spacing of points."""
+_GAP_CONFIDENCE = 0.5  # Of gaps between points that are filled in.
 
 
 def refine_segmentation(
@@ -39,11 +39,11 @@ def refine_segmentation(
     config: SegmentationConfig,
     seed: int,
 ) -> WallSegmentation:
-    """Draws the mask anew: by significant steps against the wall's own surface.
+    """Redraws the mask by significant steps from the wall's own surface.
 
-    The paper's steps part a cloud by planes a few cm thick. Here the surface that most
-    of their wall lies on is fitted, everything level with it is wall, and what was not
-    seen is never paintable, but for gaps between points, and says why.
+    The paper's steps divide a cloud by planes a few cm thick. Here a surface is fitted
+    to most of their wall, and cells level with it are wall. Unseen cells are not
+    paintable, but for gaps between points; each has a reason.
 
     Args:
         coarse: Result of the paper's steps.
@@ -79,8 +79,8 @@ def refine_segmentation(
     near = np.abs(fine.depth) <= config.distance_threshold + config.cluster_tolerance
     near |= np.repeat(np.repeat(coarse.wall_mask, split, axis=0), split, axis=1)
     try:
-        # The splines' matrices are handled in pieces too small to share out: where
-        # another process has a core, OpenBLAS's threads wait for each other at each.
+        # The splines' matrices are too small for several threads: where another process
+        # holds a core, OpenBLAS's threads wait for each other at each call.
         with _threads().limit(limits=1, user_api="blas"):
             surface = fit_wall_surface(
                 fine.depth, near, cell=cell / split, rng=np.random.default_rng(seed)
@@ -127,7 +127,7 @@ def refine_segmentation(
 
 @functools.cache
 def _threads() -> ThreadpoolController:
-    """Returns what sets the threads of the libraries loaded."""
+    """Returns the control of the loaded libraries' threads."""
     return ThreadpoolController()
 
 
@@ -139,7 +139,7 @@ def _blocks(grid: Grid, split: int) -> Grid:
 
 
 def _mean_residual(steps: StepDetection, level: BoolArray, split: int) -> FloatArray:
-    """Returns each cell's mean residual, m, over the sub-cells that are as it is."""
+    """Returns each cell's mean residual, m, over its sub-cells of the same level."""
     residual = _blocks(steps.residual, split)
     known = np.isfinite(residual)
     alike = known & (_blocks(steps.level, split) == level[:, :, np.newaxis])
@@ -177,7 +177,7 @@ def _labels(coarse: WallSegmentation, mask: BoolArray, hole: BoolArray) -> IntAr
     """Returns labels by area: the mask's parts, and the paper's regions beside them."""
     parts, count = label(mask, structure=_SQUARE)
     regions = np.where(coarse.wall_mask, 0, coarse.labels.astype(np.int64))
-    # What was wall and is none now joins the region it touches, or stands for itself.
+    # Former wall joins the region that it touches or becomes one of its own.
     fresh, number = label(~mask & ~hole & (regions == 0), structure=_SQUARE)
     old = (regions > 0) & ~mask & ~hole
     if old.any() and number:
@@ -194,7 +194,7 @@ def _labels(coarse: WallSegmentation, mask: BoolArray, hole: BoolArray) -> IntAr
 def _confidence(
     steps: StepDetection, share: FloatArray, gap: BoolArray, hole: BoolArray, split: int
 ) -> FloatArray:
-    """Returns how sure each cell's answer is, 0 to 1.
+    """Returns the confidence of each cell's answer, 0 to 1.
 
     The chance that a normal error of the residual's standard deviation does not carry
     it over the bound, times how clearly the sub-cells voted.

@@ -10,7 +10,7 @@ from perception.ground import BoolArray, FloatArray, FrozenValue
 from perception.values import TileSize
 
 _RAISED = 0.02
-"""What stands so far before the wall hides more than the width of a cell, m."""
+"""Things this far in front of the wall hide more than the width of a cell, m."""
 _LEVEL = 0.04
 """The wall's own points lie so near to the plane that it was found on, m."""
 _SLIVER = 2.0
@@ -19,10 +19,10 @@ _SLIVER = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Relief(FrozenValue):
-    """What is known of the tile after a scan.
+    """Things and hidden wall on the tile after a scan.
 
     Attributes:
-        height: (ny, nx) m, of what is raised; 0 elsewhere.
+        height: (ny, nx) m, of raised things; 0 elsewhere.
         hidden: (ny, nx) cells in shadows wider than an edge's own error.
         cell: Edge of a cell, m.
     """
@@ -43,7 +43,7 @@ def find_relief(
 
     Args:
         p_TQs: (3, N) m, in T: surface points, denser than the grid.
-        p_TCs: (3, k) m, in T, where the pictures were taken.
+        p_TCs: (3, k) m, in T: camera centres.
         tile: Its size.
         cell: Edge of a cell, m.
     """

@@ -13,10 +13,10 @@ _SIGNIFICANT = 8.0
 
 
 def smooth_patches(depth: FloatArray, *, noise: float) -> IntArray:
-    """Parts a grid where its depth steps; slopes, waves and bulges hang together.
+    """Splits a grid where its depth steps; slopes, waves and bulges stay in one patch.
 
     Between two neighbours the surface steps if their depths differ by more than the
-    mean of the differences on either side lets expect.
+    mean of the differences on either side predicts.
 
     Args:
         depth: (ny, nx) m; NaN = nothing there.
@@ -47,7 +47,7 @@ def smooth_patches(depth: FloatArray, *, noise: float) -> IntArray:
 def _smooth(depth: FloatArray, limit: float) -> BoolArray:
     """Returns (ny, nx - 1): whether the surface runs on from a cell to the next."""
     step = np.diff(depth, axis=1)
-    # At borders of what was seen the slope is only known on one side, or on none.
+    # At the border of seen cells the slope is known on one side at most.
     padded = np.pad(step, ((0, 0), (1, 1)), constant_values=np.nan)
     before, after = padded[:, :-2], padded[:, 2:]
     slope = np.where(np.isfinite(before), before, after)

@@ -1,8 +1,8 @@
 """Smooth surfaces over a grid: penalised splines fitted by weighted least squares.
 
 A tensor-product cubic B-spline with a penalty on third differences of its coefficients:
-a quadratic (which holds tilt, bulge and twist) where the penalty is strong, and where
-it is weak a spline that bridges what has no weight.
+a quadratic (tilt, bulge and twist) where the penalty is strong; where it is weak, a
+spline that bridges places without weight.
 
 Source: Eilers and Marx, "Flexible smoothing with B-splines and penalties", 1996.
 """

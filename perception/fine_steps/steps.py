@@ -1,9 +1,9 @@
 """Fine steps: which parts of the tile rise from the wall's surface or lie behind it.
 
-A part is no wall when its step is significant against what depths scatter there, not
-when it passes a fixed number of centimetres. The scatter is measured on the wall
-itself, block by block: so it holds the errors that fusing many pictures does not
-average out (a camera's fixed pattern and ripple, errors of its pose), and plaster.
+A part is not wall if its step is significant against the scatter of depth there; there
+is no fixed bound in centimetres. The scatter is measured on the wall itself, block by
+block: so it includes the errors that fusing many pictures does not average out (fixed
+pattern and ripple of the camera, errors of its pose), and plaster.
 """
 
 import math
@@ -16,17 +16,17 @@ from perception.config import SegmentationConfig
 from perception.fine_steps.wall_surface import WallSurface
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
-_RIVAL_SHARE = 0.3
-"""Points with less than this share of the best count in their sub-cell are ghosts."""
+_OUTLIER_SHARE = 0.3
+"""Points with less than this share of the best count in their sub-cell are outliers."""
 _LAYER = 0.010
-"""Points that lie so close behind the foremost are of one surface with it, m."""
+"""Points so close behind the foremost are of the same surface, m."""
 _BLOCK = 0.25
 """Edge of the blocks in which the scatter is measured, m."""
 _LEAST_SAMPLES = 50
 _WINDOW = 5
 """Sub-cells averaged to find low steps in strong noise."""
 _HIGH = 2.0
-"""Steps of more than so many bounds are no low steps, and stay out of such means."""
+"""Steps above so many bounds are not low; such means leave them out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +35,10 @@ class SubCells(FrozenValue):
 
     Attributes:
         depth: (split ny, split nx) m along T z; NaN = nothing seen.
-        variance: The same shape, m²: of the depth, as far as it is independent from
-            point to point; 0 where that is not known.
+        variance: The same shape, m²: of the depth, the part that is independent from
+            point to point; 0 = unknown.
         p_TQs: (3, M) m, in T: all points that are not hidden. Beside an edge a sub-cell
-            holds some of what is near and of what is far.
+            holds points of both surfaces.
         index: (M,) the sub-cell of each, row by row.
     """
 
@@ -75,17 +75,17 @@ def sub_cells(
     split: int,
     spacing: float,
 ) -> SubCells:
-    """Takes the foremost surface of each sub-cell, as the gun meets it.
+    """Finds the foremost surface of each sub-cell, which the gun meets first.
 
-    Of several points above one sub-cell those that were measured much less often than
-    the others are ghosts; of the rest the foremost, and what lies within a layer behind
-    it, count by their measurements. What lies behind a surface that stands on all four
-    sides of it is hidden, also where no point of that surface is straight above.
+    Of several points above one sub-cell those with far fewer measurements than the
+    others are outliers. Of the inliers the foremost, and those within a layer behind
+    it, are averaged, weighted by their measurements. Points behind a surface that
+    surrounds them on four sides are hidden, also where it has no point straight above.
 
     Args:
         p_TQs: (3, N) m, in T.
-        counts: (N,) measurements in each point; all alike if left out.
-        variances: (N,) m², of one measurement of each point.
+        counts: (N,) measurements in each point; None = all alike.
+        variances: (N,) m², of one measurement of each point; None = unknown.
         shape: (ny, nx) cells of the tile.
         cell: Edge of a cell, m.
         split: Sub-cells along a cell's edge.
@@ -99,7 +99,7 @@ def sub_cells(
     n = np.ones(z.size) if counts is None else counts[inside].astype(float)
     best = np.zeros(nx * ny)
     np.maximum.at(best, own, n)
-    real = n >= _RIVAL_SHARE * best[own]
+    real = n >= _OUTLIER_SHARE * best[own]
     own, z, n = own[real], z[real], n[real]
     front = np.full((ny, nx), -np.inf)
     np.maximum.at(front.ravel(), own, z)
@@ -127,10 +127,10 @@ def sub_cells(
 
 
 def _cover(front: FloatArray, reach: int) -> FloatArray:
-    """Returns the depth up to which things stand on all four sides of a sub-cell.
+    """Returns the depth of the surface that surrounds a sub-cell on four sides.
 
-    The square round it falls into four oblongs like the blades of a windmill. Beside a
-    straight edge one of them at least holds nothing of what stands farther in front.
+    The square round it splits into four oblongs like the blades of a windmill. Beside a
+    straight edge at least one of them holds no point of the nearer surface.
     """
     ny, nx = front.shape
     padded = np.pad(front, reach, constant_values=-np.inf)
@@ -151,10 +151,10 @@ def _cover(front: FloatArray, reach: int) -> FloatArray:
 def find_steps(
     cells: SubCells, surface: WallSurface, *, cell: float, config: SegmentationConfig
 ) -> StepDetection:
-    """Tells what is level with the wall from what is not.
+    """Finds the sub-cells that are level with the wall.
 
-    Low steps in strong noise show in the mean over a few sub-cells; such a mean blurs
-    edges, so they are drawn where it passes half the step.
+    Low steps in strong noise show in the mean over a few sub-cells. Such a mean blurs
+    edges, so the edge is where it crosses half the step.
 
     Args:
         cells: Foremost surface.
@@ -189,8 +189,8 @@ def _bounds(
 ) -> tuple[FloatArray, FloatArray]:
     """Returns the standard deviation of residuals and the least significant step.
 
-    However a place scatters, as where a column fills it, what is farther off than the
-    wall's points may be from their plane is a step.
+    Whatever the scatter, as where a column fills a block, residuals above the inlier
+    distance of the wall's plane are steps.
     """
     sigma = np.sqrt(_scatter(residual, noise, cell) ** 2 + variance)
     most = max(config.min_step, config.distance_threshold)
@@ -200,8 +200,8 @@ def _bounds(
 def _scatter(residual: FloatArray, noise: float, cell: float) -> FloatArray:
     """Returns the scatter about zero, m, block by block, spread over the grid.
 
-    From the median of the absolute residuals, which half of the cells may be off
-    without harm; what is a step for certain is left out before.
+    From the median of the absolute residuals, which tolerates half of the cells as
+    outliers; certain steps are left out first.
     """
     ny, nx = residual.shape
     size = max(1, round(_BLOCK / cell))
@@ -215,7 +215,7 @@ def _scatter(residual: FloatArray, noise: float, cell: float) -> FloatArray:
     known = np.count_nonzero(np.isfinite(blocks), axis=1)
     whole = float(np.nanmedian(off)) if np.isfinite(off).any() else 0.0
     middle = blocks[np.arange(known.size), np.maximum(known - 1, 0) // 2]
-    # A block with little wall in it is worth no more than the whole tile.
+    # A block with little wall takes the scatter of the whole tile.
     middle = np.where(known >= _LEAST_SAMPLES, middle, whole)
     middle = 1.4826 * middle.reshape(rows, columns)
     return np.repeat(np.repeat(middle, size, axis=0), size, axis=1)[:ny, :nx]

@@ -1,4 +1,4 @@
-"""What was not seen, and why: gaps between points, shadows, glass, or simply never."""
+"""Why cells were not seen: gaps between points, shadows, glass, or no picture."""
 
 import enum
 import math
@@ -17,18 +17,18 @@ from perception.fine_steps.sight import seen_from
 from perception.ground import BoolArray, FloatArray, IntArray
 
 _FAR = 0.25
-"""What lies farther behind the wall than any frame is seen through glass, m."""
+"""Points farther behind the wall than any frame are seen through glass, m."""
 _SHADOW_REACH = 1.5
-"""Shadows reach so many times the height of what casts them: a view at 56 deg."""
+"""Reach of a shadow, in heights of the thing that casts it: a view at 56 deg."""
 _SHADOW_MARGIN = 0.02
-"""So near to an edge the matcher loses wall that is not hidden, m."""
+"""Distance from an edge within which the matcher loses wall that is visible, m."""
 _SURE_VIEW = 0.5
-"""A camera that looks square at the wall has in its picture what lies no farther aside
-than this times its distance."""
+"""A camera square to the wall surely shows places up to this share of its distance
+aside."""
 _SURE_PICTURES = 5
-"""What so many pictures should have shown is not hidden."""
-_MOST_EYES = 40
-"""Of more pictures, evenly chosen ones will do."""
+"""A place that so many pictures should have shown is not hidden."""
+_MOST_CENTRES = 40
+"""Of more camera centres, so many are chosen evenly."""
 _LEAST_PANE = 0.02
 """Smaller holes without a frame are not taken for panes, m²."""
 _PANE_FILL = 0.85
@@ -37,19 +37,19 @@ _SQUARE = np.ones((3, 3), dtype=np.bool_)
 
 
 class Reason(enum.IntEnum):
-    """Why a cell is not to be painted."""
+    """Why a cell is not painted."""
 
-    WALL = 0  # It is wall, and to be painted.
-    RAISED = 1  # Something stands before the wall.
+    WALL = 0  # It is wall and is painted.
+    RAISED = 1  # A thing in front of the wall.
     RECESSED = 2  # The surface lies behind the wall: frame, panel, niche.
     UNSEEN = 3  # No picture shows it.
     GLASS = 4  # Seen through, mirrored, or nothing came back from a pane.
-    SHADOW = 5  # Hidden by something that stands before the wall.
+    SHADOW = 5  # Hidden by a thing in front of the wall.
     SPECK = 6  # Level with the wall, but alone and tiny.
 
 
 def close_gaps(seen: BoolArray, *, spacing: float, cell: float) -> BoolArray:
-    """Marks the unseen cells that are no more than gaps between points.
+    """Finds the unseen cells that are mere gaps between points.
 
     Args:
         seen: (ny, nx) True = the cell holds a point.
@@ -64,7 +64,7 @@ def close_gaps(seen: BoolArray, *, spacing: float, cell: float) -> BoolArray:
     square = np.ones((2 * reach + 1,) * 2, dtype=np.bool_)
     unseen = np.pad(~seen, 2 * reach, constant_values=False)
     core = binary_opening(unseen, square)
-    # The opening rounds a hole's outline off; what touches it belongs to it.
+    # The opening rounds a hole's outline; cells that touch it belong to it.
     hole = binary_dilation(core, _SQUARE, iterations=1, mask=unseen)
     inner = (slice(2 * reach, -2 * reach),) * 2
     gaps: BoolArray = ~seen & ~hole[inner]
@@ -79,20 +79,19 @@ def explain(
     cell: float,
     p_TCs: FloatArray | None = None,
 ) -> IntArray:
-    """Says of each hole whether it is glass, a shadow or simply unseen.
+    """Decides for each hole whether it is glass, a shadow or just unseen.
 
-    A hole beside something raised, no farther than that can hide the wall from a
-    slanting view, is its shadow, unless it should have shown in pictures whose places
-    are known. One that touches a recess, or is a large upright rectangle, is glass. So
-    is what shows things far behind the wall.
+    A hole so close to a raised thing that this can hide the wall from an oblique view
+    is its shadow, unless known camera centres should have seen it. A hole that touches
+    a recess, or is a large upright rectangle, is glass. So are cells that show things
+    far behind the wall.
 
     Args:
         reason: (ny, nx) values of `Reason`, as far as the seen cells go.
         residual: (ny, nx) m before the wall's surface; NaN = not seen.
         hole: (ny, nx) unseen cells.
         cell: Edge of a cell, m.
-        p_TCs: (3, k) m, in T, where the pictures were taken, square to the wall; None
-            if that is not known.
+        p_TCs: (3, k) m, in T: camera centres, square to the wall; None = unknown.
 
     Returns:
         (ny, nx) values of `Reason` for all cells.
@@ -123,11 +122,11 @@ def in_shadow(
     cell: float,
     p_TCs: FloatArray | None = None,
 ) -> BoolArray:
-    """Finds the holes that something raised hides.
+    """Finds the holes in the shadow of raised things.
 
     Args:
         hole: (ny, nx) unseen cells.
-        raised: (ny, nx) cells of what stands before the wall.
+        raised: (ny, nx) cells of things in front of the wall.
         residual: (ny, nx) m before the wall's surface; NaN = not seen.
         cell: Edge of a cell, m.
         p_TCs: See `explain`.
@@ -155,15 +154,15 @@ def in_shadow(
 def _shown(
     cells: BoolArray, height: FloatArray, p_TCs: FloatArray, cell: float
 ) -> BoolArray:
-    """Tells which of the cells (n of them) pictures should have shown."""
+    """Returns which of the n cells marked the pictures should have shown."""
     rows, columns = np.nonzero(cells)
     p_TQs = cell * np.column_stack([columns + 0.5, rows + 0.5])
-    every = math.ceil(p_TCs.shape[1] / _MOST_EYES)
-    eyes = p_TCs.T[::every]
-    eyes = eyes[eyes[:, 2] > height.max()]
-    aside = np.abs(eyes[:, None, :2] - p_TQs[None]).max(axis=2)
-    shown = aside <= _SURE_VIEW * eyes[:, 2:]
-    shown &= seen_from(eyes, p_TQs, height, cell=cell)
+    every = math.ceil(p_TCs.shape[1] / _MOST_CENTRES)
+    centres = p_TCs.T[::every]
+    centres = centres[centres[:, 2] > height.max()]
+    aside = np.abs(centres[:, None, :2] - p_TQs[None]).max(axis=2)
+    shown = aside <= _SURE_VIEW * centres[:, 2:]
+    shown &= seen_from(centres, p_TQs, height, cell=cell)
     return np.asarray(shown.sum(axis=0) * every >= _SURE_PICTURES)
 
 

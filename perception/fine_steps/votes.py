@@ -1,8 +1,8 @@
 """Which cells are wall at their centres, by the votes of the points around them.
 
-A cell is painted or not as a whole, and what counts is what lies at its centre. So its
-points do not vote alike: those near the centre count, be they in the cell or beside it.
-The votes of both sides of a straight edge balance on the edge itself.
+A cell is painted or not as a whole, by what lies at its centre. So points are weighted
+by their distance from the centre, whether they lie in the cell or beside it. The votes
+of both sides of a straight edge balance on the edge itself.
 """
 
 import math
@@ -37,7 +37,7 @@ class Votes(FrozenValue):
 
 
 def point_votes(cells: SubCells, steps: StepDetection, surface: WallSurface) -> Votes:
-    """Lets each point that is not hidden vote.
+    """Returns the votes of all points that are not hidden.
 
     Args:
         cells: Foremost surface.

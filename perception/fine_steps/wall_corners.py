@@ -1,7 +1,7 @@
 """Walls that meet in an edge within the tile: each is a smooth piece of its own.
 
-The edge is found between planes; what each wall is beside being flat, its own spline
-finds then. So only walls that are flat within a few mm are parted.
+The edge is found between planes; each wall then gets its own spline. So only walls that
+are flat within a few mm are split.
 """
 
 import math
@@ -32,7 +32,7 @@ _ROUNDS = 3
 
 
 def part_at_corners(blocks: Blocks, wall: BoolArray) -> list[BoolArray]:
-    """Parts a wall where it bends, and finds the walls that meet it.
+    """Splits a wall where it bends, and finds the walls that meet it.
 
     Args:
         blocks: Depths over the tile.
@@ -99,7 +99,7 @@ def _meet(
     planes: list[FloatArray],
     slack: float,
 ) -> bool:
-    """Tells whether one wall meets the other as in a corner.
+    """Checks that one wall meets the other as in a corner.
 
     A wedge or a slanting sill meets the wall without a step on one side alone.
     """

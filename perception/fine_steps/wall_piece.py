@@ -15,29 +15,29 @@ from perception.ground import BoolArray, FloatArray, IntArray
 from perception.paper_steps.planes import ransac_plane
 
 _KNOTS = (0.25, 0.125)
-"""Distance of knots, m. Waves from about three times that length are followed, and a
-plate of 0.2 m is bridged and not climbed; closer knots are for walls that need them."""
+"""Distance of knots, m. The spline follows waves from about three times that length and
+bridges a plate of 0.2 m; closer knots are for walls that need them."""
 _SCATTER, _FOLLOWED = 0.0012, 2.5
-"""A wall is followed if it scatters less than this about its surface, m, or than so
-many times its noise."""
+"""A surface fits if the wall scatters about it by less than this, m, or than so many
+times the noise."""
 _MOST_SPLINES = 4096
-"""As many as lie on 256 m² 0.25 m apart; on larger tiles they lie farther apart."""
+"""256 m² at 0.25 m; on larger tiles the knots lie farther apart."""
 _FINEST = 0.2
 """Blocks larger than this share of the closer knots' distance cannot place a step; the
-spline would climb what stands on the wall."""
+spline would follow things on the wall."""
 _PENALTIES = (1e6, 1e3, 1.0, 1e-2)
 """Weight of the penalty against that of a cell: from a quadratic to the spline."""
 _MOST_REPEATS = 30
-_GROWN = 1.001  # Growth of the cells that count below which a fit is settled.
+_GROWN = 1.001  # Growth of the weighted cells below which a fit has converged.
 _START_POINTS = 20_000
 _START_THRESHOLD = 0.004
 _LEAST_WINDOW = 0.003
-"""Cells farther off than a few times the noise, but at least this, count nothing, m."""
+"""Cells off by more than a few times the noise, but at least this, lose weight, m."""
 _WINDOWS = (16.0, 10.0, 6.0)
 """The same in standard deviations of the noise, from the first fits to the last."""
-_WIDE = 4.5  # Median deviations of what is not followed yet that still count.
+_WIDE = 4.5  # Median deviations within which cells keep weight in early fits.
 _LEAST_PATCH = 0.002  # m²
-_SWAY = 0.02  # m a surface may be off for each metre that it is drawn on.
+_SWAY = 0.02  # Error of an extrapolated surface, m for each metre.
 _LEAST_FACING = math.cos(math.radians(60.0))
 
 
@@ -89,7 +89,7 @@ class Piece:
 
 
 def fit_piece(blocks: Blocks, cells: BoolArray) -> Piece:
-    """Fits a surface to blocks that hang together, with no closer knots than needed.
+    """Fits a surface to connected blocks, with no closer knots than needed.
 
     Args:
         blocks: Depths over the tile.
@@ -135,7 +135,7 @@ def _settle(
             followed = 0
             for _ in range(_MOST_REPEATS):
                 off = np.abs(values - height)
-                # What the stiff splines cannot follow yet is not far off, but bent.
+                # Stiff splines cannot follow bends yet: cells there are no outliers.
                 scatter = _WIDE * float(np.median(off[cells]))
                 least = _LEAST_WINDOW * window / _WINDOWS[-1]
                 limit = max(least, window * blocks.noise, scatter)
@@ -146,17 +146,17 @@ def _settle(
                     raise ValueError("the wall's cells lie on no surface.")
                 coefficients = spline.solve(weight, values, penalty)
                 height = spline.heights(coefficients)
-                # Step by step it grows along a wave from where it lies on it already.
+                # The surface grows along a wave from where it already fits.
                 if count <= _GROWN * followed:
                     break
                 followed = count
     return Piece(cells, height, spline, coefficients)
 
 
-def run_on(piece: Piece, blocks: Blocks) -> Piece:
-    """Adds the patches beside a piece's that its surface runs on in.
+def extend_piece(piece: Piece, blocks: Blocks) -> Piece:
+    """Adds the neighbouring patches that continue a piece's surface.
 
-    The farther the surface has to be drawn on, the less it is trusted.
+    The farther the surface is extrapolated, the larger its error may be.
 
     Args:
         piece: Fitted to some of the blocks.
@@ -196,11 +196,10 @@ def plane_heights(blocks: Blocks, use: BoolArray) -> FloatArray:
 
     Args:
         blocks: Depths over the tile.
-        use: (my, mx) the blocks to look at, at least one.
+        use: (my, mx) the blocks to use, at least one.
 
     Returns:
-        (my, mx) m, the plane's heights; of a level one through the median where there
-        is no such plane.
+        (my, mx) m, the plane's heights; without such a plane, the median everywhere.
     """
     rows, columns = np.nonzero(use)
     step = max(1, rows.size // _START_POINTS)

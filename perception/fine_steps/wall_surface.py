@@ -1,12 +1,12 @@
 """The wall's own surface over the tile: flat, bulged, twisted, wavy or bent in corners.
 
-The depths fall into patches within which nothing steps. A spline is fitted to the patch
-of the wall by iteratively reweighted least squares with Tukey's biweight, and patches
-that it runs on in join it. A large patch that meets the wall in an edge without a step
-is another wall in a corner, and a surface of its own.
+The depths split into patches without a step inside. A spline is fitted to the patch of
+the wall by iteratively reweighted least squares with Tukey's biweight, and patches that
+continue it join it. A large patch that meets the wall in an edge without a step is
+another wall in a corner, with a surface of its own.
 
 A moulding is wall where the surface follows it: gentle in slope and wider than about
-half a metre. What rises sharply is a step, however low, and no part of the surface.
+half a metre. A sharp rise is a step, however low, and not part of the surface.
 
 Source: Beaton and Tukey, "The fitting of power series", 1974 (biweight); for the
 splines see `perception.fine_steps.spline_surface`.
@@ -24,8 +24,8 @@ from perception.fine_steps.wall_corners import part_at_corners
 from perception.fine_steps.wall_piece import (
     Blocks,
     Piece,
+    extend_piece,
     fit_piece,
-    run_on,
     surface_normals,
 )
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
@@ -36,12 +36,12 @@ _NEIGHBOURED = 0.9
 """Share of blocks beside which there is another, from which they show steps."""
 _EDGE_BLOCKS = 3.0
 _LEAST_CELLS = 500
-_NEAR = 0.03  # Standard deviation about T's plane within which the wall is looked for.
+_NEAR = 0.03  # Standard deviation about T's plane within which the wall is searched.
 
 
 @dataclass(frozen=True, eq=False)
 class WallSurface(FrozenValue):
-    """Surface of the wall at the centres of a grid's cells, also where things hide it.
+    """Surface of the wall at the centres of a grid's cells, also where it is hidden.
 
     Attributes:
         height: (ny, nx) m along T z.
@@ -100,11 +100,11 @@ def fit_wall_surface(
     parts = part_at_corners(blocks, patch)
     if len(parts) == 1:
         parts = [patch & may_be]
-    # No piece runs on in blocks of another's patches.
+    # No piece continues into another's patches.
     others = np.unique(blocks.patches[np.any(parts, axis=0)])
     free = np.where(np.isin(blocks.patches, others), -1, blocks.patches)
     blocks = dataclasses.replace(blocks, patches=free)
-    pieces = [run_on(fit_piece(blocks, cells), blocks) for cells in parts]
+    pieces = [extend_piece(fit_piece(blocks, cells), blocks) for cells in parts]
     heights = np.stack(
         [piece.spline.heights_at(y, x, piece.coefficients) for piece in pieces]
     )
@@ -118,7 +118,7 @@ def fit_wall_surface(
 def neighbour_noise(depth: FloatArray, use: BoolArray, *, order: int = 1) -> float:
     """Estimates the noise of depths from the differences of cells side by side.
 
-    The median makes it blind to steps, and neighbours to the wall's shape.
+    The median rejects steps, and differences of neighbours the wall's shape.
 
     Args:
         depth: (ny, nx) m.
@@ -155,9 +155,8 @@ def _owners(
 ) -> IntArray:
     """Returns (ny, nx): the piece that each cell belongs to.
 
-    That is the one whose blocks are nearest. Along an edge, where blocks are too coarse
-    for it, it is the one before the other where the walls close in, and the one behind
-    it where they fall away.
+    That is the one with the nearest blocks. Along an edge, where blocks are too coarse,
+    it is the nearer surface in an inner corner and the farther one in an outer corner.
     """
     rows = np.minimum((y / blocks.cell).astype(np.int64), blocks.y.size - 1)
     columns = np.minimum((x / blocks.cell).astype(np.int64), blocks.x.size - 1)

@@ -17,7 +17,7 @@ from perception.io.bags import depth_groups, intrinsics_of, play_apart
 from perception.io.camera_file import CAMERA_FILE, write_camera
 
 TIMEOUT = 1800.0
-"""A recording that takes longer to unpack is given up, s."""
+"""Longest time that unpacking may take, s."""
 _QUICK_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 
 
@@ -75,7 +75,7 @@ def _as_bgr(frame: Any, shape: tuple[int, ...]) -> Any:
         return picture
     if kind.endswith("rgb8"):
         return picture[:, :, ::-1].copy()
-    raise ValueError(f"its colour is {kind}; rgb8 and bgr8 are read")
+    raise ValueError(f"colour format {kind} is unknown; known: rgb8, bgr8")
 
 
 def _main() -> None:

@@ -31,11 +31,11 @@ _FRAME_WAIT_MS = 2000
 
 
 def read_bag(path: Path) -> FloatArray:
-    """Reads the depth of a RealSense recording of a scene at rest.
+    """Reads the depth of a RealSense recording of a static scene.
 
     Args:
-        path: A `.bag` or `.db3` file with a depth stream; its first `MAX_FRAMES`
-            pictures are fused by `median_depth`.
+        path: A `.bag` or `.db3` file with a depth stream; `median_depth` fuses its
+            first `MAX_FRAMES` images.
 
     Returns:
         p_CQs (3, N) m, in C (x right, y down, z ahead).
@@ -60,11 +60,11 @@ def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
     """Plays a recording in a process of its own.
 
     Args:
-        module: Run as a program with the paths of recording and result; what it cannot
-            read it says in its last line.
+        module: Program to run, with the paths of recording and result. Its last line on
+            stderr says why it failed.
         path: A `.bag` or `.db3` file.
-        out: Where the result goes.
-        timeout: The process is given up after this time, s.
+        out: Path of the result.
+        timeout: Kills the process after this time, s.
 
     Raises:
         CloudReadError: The file is missing or unusable, or pyrealsense2 is not
@@ -82,29 +82,30 @@ def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
         done = subprocess.run(words, capture_output=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired as error:
         raise CloudReadError(
-            f"{path}: librealsense took over {timeout:g} s.", code="PNT-FRAMES-002"
+            f"{path}: librealsense did not finish within {timeout:g} s.",
+            code="PNT-FRAMES-002",
         ) from error
     if done.returncode != 0 or not out.exists():
         reason = done.stderr.decode(errors="replace").strip().splitlines()
         raise CloudReadError(
-            f"{path}: librealsense cannot read it: "
-            f"{reason[-1] if reason else f'it ended with {done.returncode}'}.",
+            f"{path}: librealsense cannot read the recording: "
+            f"{reason[-1] if reason else f'exit status {done.returncode}'}.",
             code="PNT-FRAMES-003",
         )
 
 
 def depth_groups(path: str, *streams: Any) -> Iterator[tuple[Any, Any]]:
-    """Plays a recording's pictures, as fast as they are taken.
+    """Plays a recording's depth frames, as fast as the caller takes them.
 
     Args:
         path: Of the recording.
-        *streams: Of librealsense, to be played alone; all if left out.
+        *streams: Streams of librealsense to play; all if left out.
 
     Yields:
         Each depth frame, and the set of frames that it came in.
 
     Raises:
-        ValueError: There is no depth picture.
+        ValueError: There is no depth image.
     """
     import pyrealsense2 as rs
 
@@ -123,7 +124,7 @@ def depth_groups(path: str, *streams: Any) -> Iterator[tuple[Any, Any]]:
         empty = False
         yield frame, group
     if empty:
-        raise ValueError("it has no depth pictures")
+        raise ValueError("no depth images")
 
 
 def intrinsics_of(frame: Any) -> CameraIntrinsics:

@@ -22,7 +22,7 @@ _PCD_FORMS = ("ascii", "binary", "binary_compressed")
 
 @dataclass(frozen=True)
 class CloudHeader:
-    """What a header promises.
+    """What a header says of the data.
 
     Attributes:
         count: Points.
@@ -30,7 +30,7 @@ class CloudHeader:
             hold several numbers.
         form: "ascii", "binary" or "binary_compressed" (field after field, by LZF).
         size: Bytes of the header itself.
-        viewpoint: Where the sensor was, in the cloud's frame and unit, if it says so.
+        viewpoint: Position of the sensor in the cloud's frame and unit, if given.
     """
 
     count: int
@@ -52,7 +52,7 @@ def parse_pcd(data: bytes) -> CloudHeader:
 
     Raises:
         ValueError: The header is damaged or not of points with x, y and z; also
-            KeyError and IndexError, with what was looked for.
+            KeyError and IndexError, for what is missing.
     """
     lines, size = header_lines(data, "DATA")
     fields = {words[0]: words[1:] for words in lines if words}
@@ -95,7 +95,7 @@ def parse_count(word: str) -> int:
     """Reads a number of points or values; ValueError = not from 0 to MAX_POINTS."""
     count = int(word)
     if not 0 <= count <= MAX_POINTS:
-        raise ValueError(f"a count of {count} is not from 0 to {MAX_POINTS}")
+        raise ValueError(f"a count must be 0 to {MAX_POINTS}, got {count}")
     return count
 
 
@@ -121,12 +121,12 @@ def point_type(
     ):
         if name in ("x", "y", "z"):
             if names.count(name) > 1 or count != 1:
-                raise ValueError(f"{name} is there more than once")
+                raise ValueError(f"field {name} occurs more than once")
             fields.append((name, kind))
         elif names.count(name) > 1 or name == "_":  # PCL's padding.
             fields.append((f"_{number}", kind, (count,)))
         else:
             fields.append((name, kind, (count,)))
     if sum(counts) > _MAX_POINT_BYTES:
-        raise ValueError(f"a point of over {_MAX_POINT_BYTES} numbers")
+        raise ValueError(f"a point has more than {_MAX_POINT_BYTES} values")
     return np.dtype(fields)

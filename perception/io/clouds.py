@@ -38,10 +38,10 @@ class RecordedCloud(FrozenValue):
 def read_cloud(path: Path) -> RecordedCloud:
     """Reads the points of a cloud.
 
-    PLY (ascii, binary) and PCD (ascii, binary, compressed) are read by NumPy, after the
-    header was checked against the length of the file: Open3D's readers give out what
-    they got of a truncated file, allocate what a damaged header asks for, and print.
-    XYZ is text with x, y and z first in each line, parted by blanks, commas or
+    NumPy reads PLY (ascii, binary) and PCD (ascii, binary, compressed), after checking
+    the header against the length of the file. Open3D's readers return part of a
+    truncated file, allocate whatever a damaged header asks for, and print.
+    XYZ is text with x, y and z first in each line, separated by blanks, commas or
     semicolons; a first line of words is a heading. NPY is an array (N, 3) or (3, N),
     read as (N, 3) when it is 3 x 3; NPZ holds one such array, alone or named "points",
     "xyz" or "p_WQs".
@@ -81,7 +81,7 @@ def read_cloud(path: Path) -> RecordedCloud:
 
 
 def read_fields(path: Path) -> npt.NDArray[Any]:
-    """Reads all that a PLY or PCD file has of its points, such as labels.
+    """Reads all fields of a PLY or PCD file, such as labels.
 
     Args:
         path: The file.
@@ -98,7 +98,7 @@ def read_fields(path: Path) -> npt.NDArray[Any]:
 
 
 def check_file(path: Path) -> None:
-    """Raises CloudReadError, with the reason, for a file that holds nothing.
+    """Raises CloudReadError if a file is missing, unreadable or empty.
 
     Args:
         path: The file.
@@ -135,7 +135,8 @@ def checked_points(path: Path, points: FloatArray) -> FloatArray:
         raise CloudReadError(f"{path}: the cloud has no points.", code="PNT-CLOUD-005")
     if count > MAX_POINTS:
         raise CloudReadError(
-            f"{path}: {count} points are over {MAX_POINTS}.", code="PNT-CLOUD-006"
+            f"{path}: {count} points, at most {MAX_POINTS} are read.",
+            code="PNT-CLOUD-006",
         )
     if not np.any(np.all(np.isfinite(points), axis=0)):
         raise CloudReadError(
@@ -151,8 +152,15 @@ def _read_fields(path: Path) -> tuple[npt.NDArray[Any], CloudHeader]:
     try:
         header = parse(data)
     except (KeyError, ValueError, IndexError) as error:
+        reason: object = error
+        if isinstance(error, LookupError):
+            short = isinstance(error, IndexError)
+            reason = (
+                "a line is too short" if short else f"{error} is missing or unknown"
+            )
         raise CloudReadError(
-            f"{path}: damaged header: {error}.", code="PNT-CLOUD-008"
+            f"{path}: damaged header: {reason}.",
+            code="PNT-CLOUD-008",
         ) from error
     if header.form == "ascii":
         return _text_fields(path, data[header.size :], header), header
@@ -162,8 +170,8 @@ def _read_fields(path: Path) -> tuple[npt.NDArray[Any], CloudHeader]:
     size = header.count * header.point.itemsize
     if len(body) < size:
         raise CloudReadError(
-            f"{path}: truncated: the header promises {header.count} points in "
-            f"{size} bytes, the file has {len(body)}.",
+            f"{path}: truncated: {header.count} points take {size} bytes, "
+            f"the file has {len(body)}.",
             code="PNT-CLOUD-009",
         )
     if header.form == "binary":
@@ -183,22 +191,22 @@ def _decompressed(path: Path, body: memoryview, header: CloudHeader) -> bytes:
     size = int.from_bytes(body[4:8], "little")
     if len(body) < 8 + packed:
         raise CloudReadError(
-            f"{path}: truncated: the header promises {header.count} points in "
-            f"{8 + packed} bytes, the file has {len(body)}.",
+            f"{path}: truncated: {header.count} points take {8 + packed} bytes, "
+            f"the file has {len(body)}.",
             code="PNT-CLOUD-010",
         )
     expected = header.count * header.point.itemsize
     if size != expected or size > _LZF_MOST * packed:
         raise CloudReadError(
-            f"{path}: damaged: {packed} bytes cannot be {size} bytes of "
-            f"{header.count} points ({expected} bytes).",
+            f"{path}: damaged: {packed} bytes cannot unpack to {size} bytes; "
+            f"{header.count} points take {expected}.",
             code="PNT-CLOUD-011",
         )
     try:
         return lzf_decompress(bytes(body[8 : 8 + packed]), size)
     except ValueError as error:
         raise CloudReadError(
-            f"{path}: the compressed data {error}.", code="PNT-CLOUD-012"
+            f"{path}: damaged LZF data: {error}.", code="PNT-CLOUD-012"
         ) from error
 
 
@@ -206,8 +214,8 @@ def _text_fields(path: Path, body: bytes, header: CloudHeader) -> npt.NDArray[An
     lines = [line for line in body.splitlines() if line.strip()]
     if len(lines) < header.count:
         raise CloudReadError(
-            f"{path}: truncated: the header promises {header.count} points, the "
-            f"file has {len(lines)} lines of data.",
+            f"{path}: truncated: {header.count} points take as many lines, "
+            f"the file has {len(lines)}.",
             code="PNT-CLOUD-013",
         )
     fields = np.zeros(header.count, dtype=header.point)
@@ -256,7 +264,7 @@ def _numbers(
         return np.loadtxt(words, usecols=columns, ndmin=2, comments=None)
     except (ValueError, IndexError, OverflowError) as error:
         raise CloudReadError(
-            f"{path}: not lines of x, y and z: {error}.", code="PNT-CLOUD-016"
+            f"{path}: expected lines of x, y and z: {error}.", code="PNT-CLOUD-016"
         ) from error
 
 
@@ -302,14 +310,16 @@ def _lone_member(path: Path) -> npt.NDArray[Any]:
             )
         info = members[names[0]]
         if info.file_size > 24 * MAX_POINTS:
-            raise ValueError(f"{info.file_size} bytes are over {24 * MAX_POINTS}")
+            raise ValueError(
+                f"it takes {info.file_size} bytes, at most {24 * MAX_POINTS} are read"
+            )
         with archive.open(info) as file:
-            # One byte more than promised shows a member that is not what it says.
+            # One byte more than announced reveals a wrong size.
             return _parse_npy(file.read(info.file_size + 1))
 
 
 def _parse_npy(data: bytes) -> npt.NDArray[Any]:
-    """Reads an array whose data are there; NumPy would allocate first."""
+    """Reads an array after checking its size; NumPy would allocate first."""
     file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     read = {
@@ -320,11 +330,11 @@ def _parse_npy(data: bytes) -> npt.NDArray[Any]:
         raise ValueError(f"NPY version {version} is unknown")
     shape, fortran, dtype = read(file)
     if dtype.hasobject or any(length < 0 for length in shape):
-        raise ValueError(f"{dtype} of shape {shape} is no cloud")
+        raise ValueError(f"{dtype} of shape {shape} is not a cloud")
     size = math.prod(shape) * dtype.itemsize
     rest = len(data) - file.tell()
     if rest < size:
-        raise ValueError(f"truncated: {size} bytes are promised, there are {rest}")
+        raise ValueError(f"truncated: it takes {size} bytes, the file has {rest}")
     values: npt.NDArray[Any] = np.frombuffer(
         data, dtype=dtype, count=math.prod(shape), offset=file.tell()
     )

@@ -1,4 +1,4 @@
-"""Recorded depth images of one camera, alone or several of a scene at rest."""
+"""Recorded depth images: one, or several of a static scene."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from perception.io.camera_file import read_camera
 from perception.io.clouds import check_file, checked_points
 
 DEPTH_SUFFIX = ".png"
-MAX_FRAMES = 60  # The median of more is no better: what is left of its error is bias.
+MAX_FRAMES = 60  # More do not improve the median: its remaining error is bias.
 _MAX_PIXELS = 50_000_000
 _DepthImage = npt.NDArray[np.uint16]
 
@@ -26,7 +26,7 @@ def read_depth(path: Path, intrinsics_path: Path) -> FloatArray:
 
 
 def read_depth_frames(paths: Sequence[Path], intrinsics_path: Path) -> FloatArray:
-    """Reads depth images of a camera and a scene at rest as one cloud.
+    """Reads depth images by a static camera of a static scene as one cloud.
 
     Args:
         paths: 16-bit PNGs, 0 = no measurement; of more than `MAX_FRAMES` as many are
@@ -56,7 +56,7 @@ def evenly(items: Sequence[Path]) -> list[Path]:
 
 
 def median_depth(frames: Sequence[_DepthImage]) -> npt.NDArray[Any]:
-    """Fuses depth images of a scene at rest.
+    """Fuses depth images of a static scene.
 
     Args:
         frames: (H, W) each, 0 = no measurement.
@@ -93,10 +93,10 @@ def _read_image(path: Path, camera: CameraIntrinsics, camera_path: Path) -> _Dep
                 )
             if width * height > _MAX_PIXELS:
                 raise CloudReadError(
-                    f"{path}: over {_MAX_PIXELS} px.", code="PNT-FRAMES-010"
+                    f"{path}: more than {_MAX_PIXELS} px.", code="PNT-FRAMES-010"
                 )
             mode, depth = image.mode, np.asarray(image)
-    # Pillow raises this and that for damaged files.
+    # Pillow raises many kinds of errors for damaged files.
     except (
         OSError,
         SyntaxError,
@@ -108,7 +108,7 @@ def _read_image(path: Path, camera: CameraIntrinsics, camera_path: Path) -> _Dep
         Image.DecompressionBombError,
     ) as error:
         raise CloudReadError(
-            f"{path}: cannot read the picture: {error}.", code="PNT-FRAMES-011"
+            f"{path}: cannot read the image: {error}.", code="PNT-FRAMES-011"
         ) from error
     if depth.ndim != 2 or depth.dtype.itemsize < 2 or depth.dtype.kind not in "iu":
         raise CloudReadError(

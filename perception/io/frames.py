@@ -149,7 +149,7 @@ def write_recording(
         frames: Frames, each with its true pose.
 
     Returns:
-        How many frames there were.
+        Number of frames.
     """
     write_camera(folder / CAMERA_FILE, intrinsics)
     for name in ("rgb", "depth"):
@@ -190,7 +190,7 @@ def read_poses(path: Path) -> list[tuple[float, RigidTransform]]:
         Times, s, and X_WC, in the file's order.
 
     Raises:
-        CloudReadError: The file is missing or a line is no pose; names the line.
+        CloudReadError: The file is missing or a line is not a pose; names the line.
     """
     if not path.is_file():
         raise CloudReadError(f"{path}: no such file.", code="PNT-FRAMES-016")
@@ -204,19 +204,19 @@ def read_poses(path: Path) -> list[tuple[float, RigidTransform]]:
             R = RotationMatrix(Rotation.from_quat([qx, qy, qz, qw]).as_matrix())
         except ValueError as error:
             raise CloudReadError(
-                f"{path}: line {number} is no pose (time, x y z, qx qy qz qw).",
+                f"{path}: line {number} is not a pose (time, x y z, qx qy qz qw).",
                 code="PNT-FRAMES-017",
             ) from error
         poses.append((time, RigidTransform(R, [x, y, z])))
     if not poses:
-        raise CloudReadError(f"{path}: holds no poses.", code="PNT-FRAMES-018")
+        raise CloudReadError(f"{path}: the file has no poses.", code="PNT-FRAMES-018")
     return poses
 
 
 def _read_image(path: Path, mode: int) -> npt.NDArray[Any]:
     image = cv2.imread(str(path), mode)
     if image is None:
-        raise CloudReadError(f"{path}: missing or no picture.", code="PNT-FRAMES-019")
+        raise CloudReadError(f"{path}: missing or not an image.", code="PNT-FRAMES-019")
     return np.asarray(image)
 
 
@@ -227,7 +227,7 @@ def _find_camera(folder: Path, depth_scale: float) -> RecordedCamera:
     path = next((path for path in paths if path.is_file()), None)
     if path is None:
         raise CloudReadError(
-            f"{folder}: no {CAMERA_FILE} (width, height, fx, fy, cx, cy).",
+            f"{folder}: no {CAMERA_FILE} (with width, height, fx, fy, cx, cy).",
             code="PNT-FRAMES-020",
         )
     camera = read_camera(path, depth_scale=depth_scale)
@@ -251,7 +251,8 @@ def _read_list(path: Path) -> tuple[FloatArray, list[Path]]:
         return times, [path.parent / row[1] for row in rows]
     except (ValueError, IndexError) as error:
         raise CloudReadError(
-            f"{path}: expected lines of time and file.", code="PNT-FRAMES-025"
+            f"{path}: each line must hold a time and a file name.",
+            code="PNT-FRAMES-025",
         ) from error
 
 
@@ -277,7 +278,7 @@ def _tum_entries(
 def _pose_at(
     time: float, times: FloatArray, poses: list[tuple[float, RigidTransform]]
 ) -> RigidTransform | None:
-    """Returns the pose at a time: between two near ones, or at one that is very near.
+    """Interpolates between two close poses, or returns one that is close enough.
 
     At 0.2 m/s the camera moves by 4 mm in MAX_TIME_DIFFERENCE.
     """
@@ -319,6 +320,6 @@ def _read_matrix(path: Path) -> RigidTransform:
         R = RotationMatrix.ProjectToRotationMatrix(matrix[:3, :3])
     except (ValueError, RuntimeError) as error:
         raise CloudReadError(
-            f"{path}: no 4 x 4 pose: {error}.", code="PNT-FRAMES-026"
+            f"{path}: not a 4 x 4 pose: {error}.", code="PNT-FRAMES-026"
         ) from error
     return RigidTransform(R, matrix[:3, 3])

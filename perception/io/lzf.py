@@ -39,13 +39,13 @@ def lzf_decompress(data: bytes, size: int) -> bytes:
             start = len(out) - ((control & 31) << 8) - data[position] - 1
             position += 1
             if start < 0:
-                raise ValueError("refers to before its beginning")
+                raise ValueError("a reference points before the data")
             piece = out[start : start + length]
             if len(piece) < length:  # It repeats itself.
                 piece = (piece * (length // len(piece) + 1))[:length]
             out += piece
     except IndexError:
-        raise ValueError("ends within a reference") from None
+        raise ValueError("the data end within a reference") from None
     if position > end or len(out) != size:
-        raise ValueError(f"gives {len(out)} bytes, not {size}")
+        raise ValueError(f"the data unpack to {len(out)} bytes, not {size}")
     return bytes(out)

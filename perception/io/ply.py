@@ -44,7 +44,7 @@ def parse_ply(data: bytes) -> CloudHeader:
 
     Raises:
         ValueError: The header is damaged or not of points with x, y and z; also
-            KeyError and IndexError, with what was looked for.
+            KeyError and IndexError, for what is missing.
     """
     if not re.match(rb"ply\s", data):
         raise ValueError("a PLY file begins with 'ply'")
@@ -64,7 +64,7 @@ def parse_ply(data: bytes) -> CloudHeader:
         raise ValueError(f"format {form!r} is unknown")
     _, count, properties = elements[0]
     if any(words[0] == "list" for words in properties):
-        raise ValueError("a vertex has a list property")
+        raise ValueError("vertices have a list property")
     names = [words[1] for words in properties]
     kinds = _TYPES | _SIZED_TYPES
     types = [_FORMS[form] + kinds[words[0]] for words in properties]

@@ -1,4 +1,4 @@
-"""Segmentations in files, as DESIGN.md section 5 lays them down."""
+"""Segmentation files, as specified in DESIGN.md, section 5."""
 
 import zipfile
 import zlib
@@ -15,7 +15,7 @@ from perception.ground import BoolArray, FloatArray
 from perception.values import Opening, WallSegmentation
 
 _FIELDS = ("labels", "depth", "wall_mask", "X_WT", "cell")
-_EXTRAS = ("surface", "normals", "confidence", "reason")  # Where they were made.
+_EXTRAS = ("surface", "normals", "confidence", "reason")  # Of fine steps alone.
 _OPENINGS = tuple(
     f"opening_{name}"
     for name in ("kind", "area", "depth", "glass_share", "corners", "p_TVs")
@@ -74,7 +74,7 @@ def load_segmentation(path: Path) -> WallSegmentation:
         missing = [name for name in _FIELDS if name not in getattr(file, "files", ())]
         if missing:
             raise CloudReadError(
-                f"{path}: no segmentation: {missing[0]} is missing.",
+                f"{path}: not a segmentation: {missing[0]} is missing.",
                 code="PNT-SEGMENT-002",
             )
         content = {name: file[name] for name in _FIELDS}
@@ -82,7 +82,7 @@ def load_segmentation(path: Path) -> WallSegmentation:
         openings = _openings({name: file[name] for name in _OPENINGS if name in file})
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise CloudReadError(
-            f"{path}: no segmentation: {error}", code="PNT-SEGMENT-003"
+            f"{path}: not a segmentation: {error}", code="PNT-SEGMENT-003"
         ) from error
     labels = content["labels"]
     for name in ("labels", "depth", "wall_mask"):
@@ -100,7 +100,9 @@ def load_segmentation(path: Path) -> WallSegmentation:
             )
     matrix = content["X_WT"]
     if matrix.shape != (4, 4) or not _is_rotation(matrix[:3, :3]):
-        raise CloudReadError(f"{path}: X_WT is no pose.", code="PNT-SEGMENT-006")
+        raise CloudReadError(
+            f"{path}: X_WT is not a rigid transform.", code="PNT-SEGMENT-006"
+        )
     cell = float(content["cell"])
     if not (np.isfinite(cell) and cell > 0.0):
         raise CloudReadError(
@@ -146,7 +148,7 @@ def _openings(arrays: dict[str, npt.NDArray[Any]]) -> tuple[Opening, ...]:
     """Returns the openings of arrays.
 
     Raises:
-        ValueError: The arrays do not belong together.
+        ValueError: The arrays do not match.
     """
     if not arrays:
         return ()
@@ -156,7 +158,9 @@ def _openings(arrays: dict[str, npt.NDArray[Any]]) -> tuple[Opening, ...]:
     *columns, corners, p_TVs = (arrays[name] for name in _OPENINGS)
     lengths = {column.shape for column in (*columns, corners)}
     if len(lengths) != 1 or p_TVs.shape != (2, int(corners.sum())):
-        raise ValueError(f"the openings have {lengths} figures, {p_TVs.shape} corners.")
+        raise ValueError(
+            f"opening arrays do not match: shapes {lengths}, corners {p_TVs.shape}."
+        )
     outlines = np.split(p_TVs, np.cumsum(corners)[:-1], axis=1)
     return tuple(
         Opening(

@@ -10,13 +10,12 @@ from scipy.spatial import cKDTree
 from perception.ground import BoolArray, FloatArray, IntArray
 
 _MORTON_BITS = 21  # Three coordinates of 21 bits fit one 64-bit code.
-# Open3D's filter gives out neither figures nor threshold; it serves clouds so large
-# that not all figures can be the same, for so many neighbours.
+# Open3D's filter returns neither figures nor threshold; it is used for clouds so large,
+# and so many neighbours, that not all figures can be the same.
 _LARGE_CLOUD = 20_000
 _MANY_NEIGHBORS = 8
-# The fast filter: share of points above its first guess of the threshold; and points
-# that stand for all dense ones, at least: this many and this share; so many of them are
-# drawn evenly.
+# The fast filter: share of points above its first guess of the threshold; least number
+# and share of points in the sample of dense ones; number of them that are drawn evenly.
 _SPARSE_SHARE = 0.005
 _SAMPLE = 16_000
 _SAMPLE_SHARE = 0.025
@@ -33,20 +32,20 @@ def statistical_filter(
     itself left out. It stays when the figure is at most mean + `std_multiplier`
     (alpha) x standard deviation (N - 1) of all figures. The paper's equation 1 has a
     lower bound too, mean - alpha x deviation; its text removes what lies above, and a
-    point in a dense place is no outlier, so the lower bound is left out. This is what
-    the Point Cloud Library's StatisticalOutlierRemoval does. The answer for a point
-    does not depend on the order of the points.
+    point in a dense place is not an outlier, so there is no lower bound here. This is
+    what the Point Cloud Library's StatisticalOutlierRemoval does. The answer for a
+    point does not depend on the order of the points.
 
     Source: Tadic et al., "Painting Robot with RealSense D435", 2021, equation 1 and
     section 4.4 (1); Rusu et al., "Towards 3D point cloud based object maps", 2008.
 
     Args:
-        p_WQs: (3, N) m, in any frame; non-finite points are outliers and count nowhere.
+        p_WQs: (3, N) m, in any frame; non-finite points are outliers and do not count.
         neighbors: Neighbours of a point; all others where there are fewer.
         std_multiplier: Threshold in standard deviations.
-        fast: Points in dense places are proved inside without their figures, and of
-            these a sample stands for all in mean and deviation: the threshold is off by
-            about 0.005 %, and points that close to it may fall to the other side.
+        fast: Accept points in dense places by a bound on their figures, and take mean
+            and deviation of these from a sample: the threshold is off by about 0.005 %,
+            and points that close to it may change sides.
 
     Returns:
         (N,) True = keep.
@@ -68,9 +67,9 @@ def statistical_filter(
         inside = _fast_filter(points, count, std_multiplier)
     else:
         codes = codes.take(order)
-        twins = bool(np.any(codes[count:] == codes[:-count]))
+        duplicates = bool(np.any(codes[count:] == codes[:-count]))
         inside = None
-        if large and not twins:
+        if large and not duplicates:
             inside = _open3d_filter(points, count, std_multiplier)
         if inside is None:
             inside = _exact_filter(points, count, std_multiplier)
@@ -133,7 +132,7 @@ def _tree(points: FloatArray) -> cKDTree:
 def _figures(tree: cKDTree, points: FloatArray, count: int) -> FloatArray:
     """Returns the mean distances of some of the tree's points to their neighbours."""
     distances, _ = tree.query(points.T, k=count + 1, workers=-1)
-    # The nearest is the point itself, or a twin at the same distance of zero.
+    # The nearest is the point itself, or a duplicate at the same distance of zero.
     figures: FloatArray = distances[:, 1:].mean(axis=1)
     return figures
 
@@ -152,9 +151,9 @@ def _open3d_filter(points: FloatArray, count: int, alpha: float) -> BoolArray | 
 
     Open3D counts the point itself as a neighbour at distance 0: with one neighbour more
     all its figures, and so its threshold, are ours times k / (k + 1). It treats figures
-    of 0 otherwise (k twins of a point), and where all figures are the same its answer
-    hangs on rounding. By Cantelli's inequality no more than 1 / (1 + alpha²) of the
-    points lie alpha deviations above a mean: more tell such a cloud.
+    of 0 otherwise (k duplicates of a point), and where all figures are the same its
+    answer depends on rounding. By Cantelli's inequality no more than 1 / (1 + alpha²)
+    of the points lie alpha deviations above a mean: more reveal such a cloud.
 
     Returns:
         (N,) True = keep; None if the cloud is of that kind.
@@ -173,14 +172,14 @@ def _fast_filter(points: FloatArray, count: int, alpha: float) -> BoolArray:
 
     A figure is at most the mean distance to any `count` other points, which follows
     for runs of points from their centres (`_bounds`). Points whose bound is below a
-    guess of the threshold are dense: a sample of them is queried and stands for all.
+    guess of the threshold are dense: a sample of them is queried and represents all.
     All others are queried. If the threshold comes out below the guess, the guess is
     lowered; once it does not, every dense point is proved inside.
     """
     with ThreadPoolExecutor(1) as thread:  # Neither holds the interpreter's lock.
-        planted = thread.submit(_tree, points)
+        future = thread.submit(_tree, points)
         bounds = _bounds(points, count)
-        tree = planted.result()
+        tree = future.result()
     figures = np.full(bounds.size, np.nan)
     # The golden ratio's multiples draw any share of the points evenly along the curve.
     turns = np.arange(bounds.size) * _GOLDEN
@@ -196,7 +195,9 @@ def _fast_filter(points: FloatArray, count: int, alpha: float) -> BoolArray:
             break
         guess = 0.99 * limit
     else:
-        return _exact_filter(points, count, alpha)  # Next to all points have k twins.
+        return _exact_filter(
+            points, count, alpha
+        )  # Nearly all points have k duplicates.
     # A comparison with NaN, of points that were not queried, is False.
     inside: BoolArray = ~(figures > limit * (1.0 + 1e-12))
     return inside
@@ -245,7 +246,7 @@ def _shares(bounds: FloatArray, guess: float) -> FloatArray:
 def _limit(figures: FloatArray, shares: FloatArray, total: int, alpha: float) -> float:
     """Estimates mean + alpha x deviation of `total` figures from those drawn.
 
-    Each stands for as many as its share says, those of share 1 for themselves alone.
+    Each is weighted by the inverse of its share.
     """
     weights = 1.0 / shares
     sampled = shares < 1.0

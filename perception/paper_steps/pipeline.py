@@ -1,4 +1,4 @@
-"""The paper's six steps, one after another, with what each leaves."""
+"""The paper's six steps, one after another, with the result of each."""
 
 from dataclasses import dataclass
 
@@ -73,7 +73,7 @@ class SegmentationStages(FrozenValue):
 def find_planes(
     p_WQs: FloatArray, *, config: SegmentationConfig, seed: int
 ) -> FoundPlanes:
-    """Does steps 1 and 2: filters the cloud and takes the planes out of it.
+    """Does steps 1 and 2: filters the cloud and finds its planes.
 
     Args:
         p_WQs: (3, N) m, in W; non-finite points are dropped.
@@ -115,8 +115,8 @@ def segment_tile(
 ) -> SegmentationStages:
     """Does steps 3 to 6 on the tile of a wall.
 
-    Every region of the wall's plane is wall, not the largest alone: a door or a pipe
-    may part the wall, and a painter paints both sides.
+    All regions of the wall's plane are wall, not just the largest: a door or a pipe may
+    divide the wall, and both sides are painted.
 
     Args:
         found: Filtered cloud and planes.

@@ -8,7 +8,7 @@ import numpy as np
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
 # Points on which candidate planes are scored; the share of inliers is then known to
-# about 1 %, enough to rank candidates, and the refit on all inliers does the rest.
+# about 1 %, enough to rank candidates before the refit on all inliers.
 _SCORE_POINTS = 4000
 # Of each batch, only the best on fewer points are scored on so many.
 _FIRST_POINTS = 500
@@ -128,7 +128,7 @@ def segment_planes(
     max_planes: int,
     rng: np.random.Generator,
 ) -> tuple[IntArray, tuple[Plane, ...]]:
-    """Takes plane after plane out of a cloud.
+    """Removes plane after plane from a cloud.
 
     Source: Tadic et al., 2021, section 4.4 (2).
 
@@ -165,7 +165,7 @@ def _random_planes(
     a, b, c = points[:, rng.integers(points.shape[1], size=(3, _BATCH))].swapaxes(0, 1)
     normals = np.cross(b - a, c - a, axis=0)
     lengths = np.linalg.norm(normals, axis=0)
-    # The doubled area of the triangle against its sides tells three points on a line.
+    # Twice the triangle's area against its sides reveals three points on a line.
     sides = np.linalg.norm(b - a, axis=0) * np.linalg.norm(c - a, axis=0)
     sound = lengths > 1e-6 * sides
     normals = normals[:, sound] / lengths[sound]

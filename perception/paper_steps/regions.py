@@ -17,7 +17,7 @@ from perception.paper_steps.label_grid import NOTHING, LabelGrid
 
 Grid = TypeVar("Grid", IntArray, FloatArray)
 
-# The half of the eight neighbours that comes later, row by row.
+# Half of the eight neighbours: those that come later, row by row.
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
 
 
@@ -48,8 +48,8 @@ def euclidean_clusters(grid: LabelGrid, *, tolerance: float) -> IntArray:
         if (dy, dx) > (0, 0) and (dy, dx) not in _NEIGHBOURS
     ]
     numbers = np.arange(seen.size).reshape(seen.shape)
-    # Most cells hang together by their neighbours already; from then on only the few
-    # links between two clusters matter.
+    # Neighbours already connect most cells; from then on only the few links between
+    # two clusters matter.
     for offsets in (list(_NEIGHBOURS), farther):
         pairs = [np.zeros((2, 0), dtype=np.int64)]
         pairs += [_links(grid, numbers, offset, tolerance) for offset in offsets]
@@ -63,7 +63,7 @@ def adjacent_regions(clusters: IntArray) -> IntArray:
     """Step 4b: parts each cluster into regions whose cells touch (8 neighbours).
 
     Depth does not count here. Cells of cluster -1 (nothing seen) form regions too:
-    holes, whose size decides what becomes of them.
+    holes, which are kept or filled by their size.
 
     Source: Tadic et al., 2021, section 4.4 (4b).
 
@@ -86,11 +86,11 @@ def adjacent_regions(clusters: IntArray) -> IntArray:
 def join_fragments(regions: IntArray, *, min_area: float, cell: float) -> IntArray:
     """Joins tiny regions that lie together into one, between steps 4 and 5.
 
-    What is not flat (a plant behind glass, a pipe, a curtain) falls to many planes and
-    so into many tiny regions. One by one they would all inherit from the wall around
-    them and be painted. A patch of them that is large in all is no noise: it is kept
-    as a region. Noise along edges is one or two cells wide and stays as it is, which is
-    why only what a square of 3 x 3 cells fits into is joined.
+    A thing that is not flat (a plant behind glass, a pipe, a curtain) splits into many
+    planes and so into many tiny regions. Each alone would inherit from the wall around
+    it and be painted. Together they are too large for noise, so they are kept as one
+    region. Noise along edges is one or two cells wide and stays as it is: only patches
+    that a square of 3 x 3 cells fits into are joined.
 
     Source: ours; the paper's step 5 has no such exception.
 
@@ -116,7 +116,7 @@ def absorb_tiny_regions(
     """Step 5: tiny regions and holes inherit from the nearest cell of a large region.
 
     Nearest is meant in the plane of the wall. A hole of `min_area` or more stays a
-    hole: what the camera never saw is not to be painted.
+    hole: unseen wall is not painted.
 
     Source: Tadic et al., 2021, section 4.4 (5).
 
@@ -142,10 +142,10 @@ def absorb_tiny_regions(
 
 
 def drop_specks(mask: BoolArray, *, min_area: float, cell: float) -> BoolArray:
-    """Takes tiny parts that stand alone out of a mask.
+    """Removes tiny isolated parts from a mask.
 
     A stray return in a large hole, such as a window, inherits from the wall as the
-    nearest; it does not touch the wall and is not to be painted.
+    nearest; it does not touch the wall and is not painted.
 
     Args:
         mask: (ny, nx).
@@ -179,7 +179,7 @@ def sort_by_area(regions: IntArray) -> IntArray:
 
 
 def _tiny(regions: IntArray, *, min_area: float, cell: float) -> BoolArray:
-    """Tells for each region number whether its area is below the bound."""
+    """Returns for each region number whether its area is below the bound."""
     # The margin keeps a region of exactly the area, as in 50 x (0.01 m)².
     tiny: BoolArray = np.bincount(regions.ravel()) * cell**2 < min_area * (1.0 - 1e-9)
     return tiny

@@ -1,4 +1,4 @@
-"""Which plane of a recorded cloud is a wall, and why the others are none."""
+"""Which plane of a recorded cloud is the wall, and why the others are not."""
 
 import math
 from collections.abc import Sequence
@@ -57,7 +57,8 @@ def choose_wall(
         )
         if reason is None:
             return number
-        reasons.append(f"{found.planes[number].count / total:.0%} of points {reason}")
+        share = found.planes[number].count / total
+        reasons.append(f"the plane with {share:.0%} of the points {reason}")
     raise NoWallError(
         f"no plane is a wall: {_listing(reasons) or 'there is none'}.",
         code="PNT-WALL-010",
@@ -91,17 +92,17 @@ def _objection(
     distance: float | None,
     p_WC: FloatArray | None,
 ) -> str | None:
-    """Says why a plane is no wall, or None."""
+    """Returns why a plane is not a wall, or None if it may be one."""
     plane = found.planes[number]
     p_WQs = found.p_WQs[:, found.kept]
     if plane.count < config.min_wall_share * p_WQs.shape[1]:
-        return f"is under {config.min_wall_share:.0%}"
+        return f"is too small, a wall has at least {config.min_wall_share:.0%}"
     if up_W is not None:
         slope = float(plane.normal @ up_W) / float(np.linalg.norm(up_W))
         lean = math.asin(min(1.0, abs(slope)))
         if lean > _MAX_LEAN:
             limit = math.degrees(_MAX_LEAN)
-            return f"leans {math.degrees(lean):.0f} deg, over {limit:.0f}"
+            return f"leans {math.degrees(lean):.0f} deg, a wall at most {limit:.0f}"
     p_WC = np.zeros(3) if p_WC is None else p_WC
     if distance is not None:
         limit = config.wall_distance_tolerance
@@ -110,7 +111,8 @@ def _objection(
             return f"is {off:.3f} m away, not {distance:g} +- {limit:g}"
     ratio = contrast(plane, p_WQs, threshold=config.distance_threshold)
     if ratio < _MIN_CONTRAST:
-        return f"is {ratio:.1f} times as dense as beside it, under {_MIN_CONTRAST:g}"
+        least = f"a wall at least {_MIN_CONTRAST:g}"
+        return f"is {ratio:.1f} times as dense as beside it, {least}"
     faces = _turned_back(found, number, p_WC)
     if len(faces) >= _FACES:
         shares = " and ".join(f"{share:.0%}" for share in faces[:_FACES])

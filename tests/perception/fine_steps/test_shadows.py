@@ -21,9 +21,9 @@ def scanned(*, hidden, top=0.1, offset=0.0):
     return np.stack([x[seen], y[seen], z[seen]])
 
 
-def relief_of(p_TQs, eyes=None):
-    eyes = np.zeros((3, 0)) if eyes is None else eyes
-    return find_relief(p_TQs, eyes, TileSize(1.0, 1.0), cell=CELL)
+def relief_of(p_TQs, p_TCs=None):
+    p_TCs = np.zeros((3, 0)) if p_TCs is None else p_TCs
+    return find_relief(p_TQs, p_TCs, TileSize(1.0, 1.0), cell=CELL)
 
 
 @pytest.mark.parametrize("offset", [-0.01, 0.0, 0.01])

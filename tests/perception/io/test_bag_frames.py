@@ -32,7 +32,7 @@ def test_damaged_recordings_are_refused(tmp_path):
     bad, out = tmp_path / "bad.bag", tmp_path / "out"
     out.mkdir()
     bad.write_bytes(BAG.read_bytes()[:300])
-    with pytest.raises(CloudReadError, match="librealsense cannot read it"):
+    with pytest.raises(CloudReadError, match="librealsense cannot read the recording"):
         unpack_bag(bad, out)
     with pytest.raises(CloudReadError, match="no such file|not found|missing"):
         unpack_bag(tmp_path / "none.bag", out)

@@ -68,7 +68,7 @@ def test_truncation_names_both_numbers(tmp_path):
     write_open3d(path)
     path.write_bytes(path.read_bytes()[:-25])
     # 200 points of three doubles are 4800 bytes.
-    with pytest.raises(CloudReadError, match="200 points in 4800 bytes, .* has 4775"):
+    with pytest.raises(CloudReadError, match="200 points take 4800 bytes, .* has 4775"):
         read_cloud(path)
 
 
@@ -92,8 +92,10 @@ def test_truncation_names_both_numbers(tmp_path):
             b"property float y\nproperty float z\nend_header\n",
             "no points",
         ),
-        ("words.xyz", b"one two three\n", "not lines of x, y and z"),
-        ("two.xyz", b"1 2\n3 4\n", "not lines of x, y and z"),
+        ("short.ply", b"ply\nformat\nend_header\n", "header: a line is too short"),
+        ("bare.pcd", b"FIELDS x y z\nDATA ascii\n", "'SIZE' is missing or unknown"),
+        ("words.xyz", b"one two three\n", "expected lines of x, y and z"),
+        ("two.xyz", b"1 2\n3 4\n", "expected lines of x, y and z"),
         ("junk.npy", b"\x93NUMPY junk", "cannot read the array"),
         ("junk.npz", b"PK\x03\x04 junk", "cannot read the array"),
     ],
@@ -208,7 +210,7 @@ def test_missing_or_damaged_depth_files_are_refused(tmp_path):
     with pytest.raises(CloudReadError, match=r"other\.json: no such file"):
         read_depth(image, tmp_path / "other.json")
     image.write_bytes(image.read_bytes()[:40])
-    with pytest.raises(CloudReadError, match=r"depth\.png: cannot read the picture"):
+    with pytest.raises(CloudReadError, match=r"depth\.png: cannot read the image"):
         read_depth(image, camera)
     camera.write_text("{")
     with pytest.raises(CloudReadError, match=r"camera\.json: not a camera"):

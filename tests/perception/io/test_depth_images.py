@@ -1,4 +1,4 @@
-"""Depth images of a scene at rest, alone, in folders and in RealSense recordings."""
+"""Depth images of a static scene, alone, in folders and in RealSense recordings."""
 
 import importlib.util
 import json
@@ -116,7 +116,9 @@ def test_damaged_recording_is_refused(recording):
     data = recording.read_bytes()
     for damaged in (data[: len(data) // 2], b"#ROSBAG V2.0\n" + data[:200]):
         recording.write_bytes(damaged)
-        with pytest.raises(CloudReadError, match="librealsense cannot read it"):
+        with pytest.raises(
+            CloudReadError, match="librealsense cannot read the recording"
+        ):
             read_bag(recording)
 
 

@@ -78,7 +78,7 @@ def test_poses_that_are_none_are_refused_by_line(tmp_path):
     write_poses(path, [(1.0, pose(1))])
     assert read_poses(path)[0][1].IsNearlyEqualTo(pose(1), 1e-8)
     path.write_text(path.read_text() + "2.0 1 2 3 0 0 0 0\n")
-    with pytest.raises(CloudReadError, match="line 3 is no pose"):
+    with pytest.raises(CloudReadError, match="line 3 is not a pose"):
         read_poses(path)
 
 
@@ -92,7 +92,7 @@ def test_poses_that_are_none_are_refused_by_line(tmp_path):
             '{"width": 64, "height": 48, "fx": 50, "fy": 50, "cx": 319.5, "cy": 24}',
             "cx must be > 0 and < width 64, got 319.5",
         ),
-        ("depth.txt", "0.0\n", "lines of time and file"),
+        ("depth.txt", "0.0\n", "a time and a file name"),
         ("rgb.txt", "", "no frames"),
     ],
 )

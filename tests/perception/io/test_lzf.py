@@ -26,10 +26,10 @@ def test_far_distance():
     ("data", "size", "message"),
     [
         (b"\x02ab", 3, "not 3"),
-        (b"\x00a" + bytes([1 << 5, 5]), 4, "before its beginning"),
-        (b"\x00a" + bytes([7 << 5]), 4, "ends within"),
-        (b"\x00a", 9, "gives 1 bytes, not 9"),
-        (b"\x02abc", 2, "gives 3 bytes, not 2"),
+        (b"\x00a" + bytes([1 << 5, 5]), 4, "points before the data"),
+        (b"\x00a" + bytes([7 << 5]), 4, "end within"),
+        (b"\x00a", 9, "unpack to 1 bytes, not 9"),
+        (b"\x02abc", 2, "unpack to 3 bytes, not 2"),
     ],
 )
 def test_damaged_blocks_are_refused(data, size, message):

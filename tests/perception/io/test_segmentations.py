@@ -104,8 +104,8 @@ def test_mask_has_its_top_row_first(tmp_path):
     [
         ({"labels": None}, "labels is missing"),
         ({"depth": np.zeros((3, 2))}, r"depth has shape \(3, 2\)"),
-        ({"X_WT": np.zeros((4, 4))}, "X_WT is no pose"),
-        ({"X_WT": np.diag([1.0, 1.0, -1.0, 1.0])}, "X_WT is no pose"),
+        ({"X_WT": np.zeros((4, 4))}, "X_WT is not a rigid transform"),
+        ({"X_WT": np.diag([1.0, 1.0, -1.0, 1.0])}, "X_WT is not a rigid transform"),
         ({"cell": 0.0}, "cell must be > 0 m, got 0.0"),
     ],
 )
@@ -125,7 +125,7 @@ def test_missing_damaged_and_foreign_files_are_refused(tmp_path):
         load_segmentation(path)
     save_segmentation(path, make_segmentation())
     path.write_bytes(path.read_bytes()[:200])
-    with pytest.raises(CloudReadError, match="no segmentation"):
+    with pytest.raises(CloudReadError, match="not a segmentation"):
         load_segmentation(path)
     np.save(tmp_path / "lone.npy", np.zeros(3))
     with pytest.raises(CloudReadError, match="labels is missing"):

@@ -189,7 +189,7 @@ def test_fast_filter_holds_without_outliers():
     assert np.count_nonzero(filtered(points, fast=True) != exact) <= 1
 
 
-def test_twins_in_a_large_cloud_stay():
+def test_duplicates_in_a_large_cloud_stay():
     # The points of a clump have figure 0, which is no outlier, and count in the mean.
     wall = furnished_wall(25_000, seed=3).p_CQs
     points = np.concatenate([wall, np.full((3, 200), 0.7)], axis=1)
@@ -201,7 +201,7 @@ def test_twins_in_a_large_cloud_stay():
 
 @pytest.mark.parametrize("fast", [False, True])
 def test_large_lattice_has_no_outliers(fast):
-    # All figures are the same: the 8 nearest of each of 25 600 twins are twins.
+    # All figures are the same: the 8 nearest points of each are its duplicates.
     corner = np.stack(np.meshgrid(*[np.arange(2.0)] * 3)).reshape(3, -1)
     points = np.repeat(corner, 3200, axis=1)
     keep = statistical_filter(points, neighbors=8, std_multiplier=3.5, fast=fast)

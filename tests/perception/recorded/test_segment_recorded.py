@@ -115,7 +115,9 @@ def test_slab_through_a_cloud_of_points_is_no_wall():
 
 
 def test_only_a_floor_is_no_wall():
-    with pytest.raises(NoWallError, match="100% of points leans 90 deg, over 20"):
+    with pytest.raises(
+        NoWallError, match="100% of the points leans 90 deg, a wall at most 20"
+    ):
         segment(floor(), up_W=UP_Z)
 
 
