@@ -325,6 +325,7 @@ ROOMS: dict[str, set[str]] = {
     # The public face stands above all but the commands.
     "painter": {
         "painter.config",
+        "painter.cycle",
         "painter.diagrams",
         "painter.errors",
         "painter.jobs",

@@ -64,7 +64,7 @@ def place(
         )
     width, height = _parse_size(wall or "2x2")
     from painter.config import load_scenario
-    from painter.jobs.propose_base import propose_base_positions
+    from painter.jobs.propose_base import propose_base
     from painter.planning.config import ZoneConfig
     from painter.scene.load import load_scene
 
@@ -75,7 +75,7 @@ def place(
         width, height = drawn.wall.width, drawn.wall.height
         zones = [ZoneConfig(corners=box) for box in drawn.opening_boxes()]
     zones += parse_zones(include, exclude, width, height)
-    proposal = propose_base_positions(job, width, height, zones)
+    proposal = propose_base(job, width, height, zones)
     with output_folder(out) as folder:
         text = json.dumps(proposal.document(), indent=1)
         (folder / STATIONS_FILE).write_text(text + "\n")

@@ -63,7 +63,7 @@ class BaseProposal:
         }
 
 
-def propose_base_positions(
+def propose_base(
     job: Scenario,
     width: float,
     height: float,

@@ -36,7 +36,7 @@ def segment_file(
 ) -> RecordedWall:
     """Segments a recorded cloud or depth image into wall and other regions.
 
-    Example: `segment("cloud.ply", tile=(2.0, 2.0)).steps.segmentation.wall_mask`.
+    Example: `segment("cloud.ply", tile=(2.0, 2.0)).stages.segmentation.wall_mask`.
 
     Args:
         cloud: PLY, PCD, XYZ, NPY or NPZ file, depth PNG or folder of them, RealSense
@@ -62,7 +62,7 @@ def segment_file(
         seed: Of RANSAC's random triples.
 
     Returns:
-        The wall: `steps` holds the segmentation and every stage on the way to it.
+        The wall: `stages` holds the segmentation and every stage on the way to it.
 
     Raises:
         CloudReadError: The file is unusable.

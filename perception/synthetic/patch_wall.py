@@ -1,7 +1,7 @@
 """Clouds of made-up walls with known answers, for tests, benchmarks and notebooks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -12,8 +12,7 @@ from perception.values import TileSize
 _TILE = TileSize(2.0, 2.0)
 
 
-@dataclass(frozen=True)
-class Patch:
+class Patch(NamedTuple):
     """A rectangle of the tile that is not wall.
 
     Attributes:
@@ -69,10 +68,12 @@ def synthetic_wall(
     Returns:
         p_WQs (3, N) m, in W, in random order.
     """
-    x, y = np.meshgrid(
-        np.arange(-margin, tile.width + margin, spacing),
-        np.arange(-margin, tile.height + margin, spacing),
+    # Whole squares: rounding must not add a row or a column on one side.
+    nx, ny = (
+        round((size + 2.0 * margin) / spacing) for size in (tile.width, tile.height)
     )
+    x, y = np.meshgrid(np.arange(nx) * spacing, np.arange(ny) * spacing)
+    x, y = x - margin, y - margin
     x, y = x.ravel(), y.ravel()
     x, y = (axis + rng.uniform(0.0, spacing, axis.size) for axis in (x, y))
     z = np.zeros(x.size)
@@ -108,6 +109,36 @@ def synthetic_truth(
     for patch in patches:
         mask &= ~_inside(patch, x, y)
     return mask
+
+
+def example_wall(
+    patches: Sequence[tuple[float, float, float, float, float]] = EXAMPLE_PATCHES,
+    *,
+    spacing: float = 0.005,
+    noise: float = 0.0015,
+    outliers: int = 0,
+    seed: int = 1,
+) -> tuple[FloatArray, BoolArray]:
+    """Makes the cloud of a wall of 2 x 2 m and its true mask.
+
+    Args:
+        patches: What is not wall: left, bottom, right and top edge in T, m, and depth
+            along T z, m (> 0 before the wall, < 0 behind it, NaN glass); a later one
+            lies over the earlier ones.
+        spacing: Of the points, m.
+        noise: Standard deviation of depth, m.
+        outliers: Points strewn evenly over the tile, up to 0.5 m off the wall.
+        seed: Of noise and outliers.
+
+    Returns:
+        p_TQs (3, N) m, and the mask (200, 200) in cells of 1 cm, row 0 at the bottom.
+    """
+    rng = np.random.default_rng(seed)
+    named = [Patch(*patch) for patch in patches]
+    cloud = synthetic_wall(
+        named, spacing=spacing, noise=noise, outliers=outliers, rng=rng
+    )
+    return cloud, synthetic_truth(named)
 
 
 def _inside(patch: Patch, x: FloatArray, y: FloatArray) -> BoolArray:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from painter.run.pictures.segmentation_picture import segmentation_picture
+from painter.run.pictures.style import png
 from perception.fine_steps.unseen import Reason
 from perception.io.segmentations import save_segmentation, save_wall_mask
 from perception.paper_steps.pipeline import SegmentationStages
@@ -33,7 +34,8 @@ def write_recorded_wall(
     save_segmentation(folder / "segmentation.npz", stages.segmentation)
     save_wall_mask(folder / "wall_mask.png", stages.segmentation.wall_mask)
     (folder / "segmentation.json").write_text(json.dumps(figures, indent=2) + "\n")
-    segmentation_picture(folder / "segmentation.png", stages, title=title)
+    picture = segmentation_picture(stages, title=title)
+    (folder / "segmentation.png").write_bytes(png(picture, dpi=110))
     return figures
 
 

@@ -118,7 +118,9 @@ def label_picture(segmentation: WallSegmentation) -> Figure:
 
 
 @style.styled
-def mask_picture(segmentation: WallSegmentation, truth: BoolArray | None) -> Figure:
+def mask_picture(
+    segmentation: WallSegmentation, truth: BoolArray | None = None
+) -> Figure:
     """Draws the mask, and where there is a truth what it has right and wrong."""
     mask, size = segmentation.wall_mask, grid_size(segmentation)
     true = mask if truth is None else truth

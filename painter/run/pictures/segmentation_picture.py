@@ -1,11 +1,11 @@
 """Pictures of a segmentation: what was seen, labels, depth, mask."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, TwoSlopeNorm
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 
 from painter.run.pictures import style
@@ -18,11 +18,10 @@ _OTHERS = (style.ORANGE, style.SKY, style.BLUE, style.VERMILION, style.PURPLE)
 _DEPTH_LIMIT = 0.15  # Of the colour scale, m.
 
 
-def segmentation_picture(path: Path, steps: SegmentationStages, *, title: str) -> None:
+def segmentation_picture(steps: SegmentationStages, *, title: str = "") -> Figure:
     """Draws the input, the labels, the residuals and the mask side by side.
 
     Args:
-        path: PNG file to write.
         steps: The segmentation with its intermediate results.
         title: Heading.
     """
@@ -42,7 +41,7 @@ def segmentation_picture(path: Path, steps: SegmentationStages, *, title: str) -
     for ax in axes[:, 1:].flat:
         ax.set_ylabel("")
     figure.suptitle(title, fontsize=13, fontweight="bold", x=0.01, ha="left")
-    path.write_bytes(style.png(figure, dpi=110))
+    return figure
 
 
 def draw_points(ax: Axes, steps: SegmentationStages) -> None:
