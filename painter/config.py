@@ -23,6 +23,7 @@ from painter.planning.config import (
     TipConfig,
 )
 from painter.resources import models_path, named_scenarios
+from painter.typed_yaml import CONVERTER, read_typed
 from perception.config import MapConfig, SegmentationConfig, StereoConfig
 from perception.mapping.config import PoseGraphConfig
 from perception.settings import Conflict, setting, validate
@@ -175,6 +176,21 @@ class Scenario:
                 yield f"raster.zones[{i}].{field}", bound, x
 
 
+def _read_plant(data: object, _: type) -> MultibodyPlantConfig:
+    # Drake's own reader, whose errors are of many types and name no field.
+    try:
+        return yaml_load_typed(
+            schema=MultibodyPlantConfig,
+            data=yaml.safe_dump(data),
+            defaults=Scenario().plant_config,
+        )
+    except (RuntimeError, ValueError, TypeError, AssertionError) as error:
+        raise ValueError(f"cannot be read: {_one_line(error)}") from error
+
+
+CONVERTER.register_structure_hook(MultibodyPlantConfig, _read_plant)
+
+
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """Loads a scenario by name or from a file.
 
@@ -226,14 +242,10 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     for word in overrides:
         _override(fields, word)
     try:
-        scenario: Scenario = yaml_load_typed(
-            schema=Scenario, data=yaml.safe_dump(fields), defaults=Scenario()
-        )
+        scenario = read_typed(Scenario, fields)
         validate(scenario)
-    except (RuntimeError, ValueError, TypeError, KeyError, AssertionError) as error:
-        raise InputError(
-            f"{path}: {_one_line(error)}", code="PNT-SCENARIO-006"
-        ) from error
+    except ValueError as error:
+        raise InputError(f"{path}: {error}", code="PNT-SCENARIO-006") from error
     return scenario
 
 

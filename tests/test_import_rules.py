@@ -128,6 +128,7 @@ ROOMS: dict[str, set[str]] = {
     "perception": set(),
     "painter.errors": {"perception.coded_error"},
     "painter.timebase": set(),
+    "painter.typed_yaml": set(),
     "painter.resources": {"painter_models"},
     "painter.planning.config": set(),
     "painter.planning": PLANNING_VALUES,
@@ -167,13 +168,18 @@ ROOMS: dict[str, set[str]] = {
         "painter.errors",
         "painter.planning.config",
         "painter.resources",
+        "painter.typed_yaml",
         "perception.config",
         "perception.mapping.config",
     },
-    "painter.scene": {"painter.errors", "painter.resources"},
+    "painter.scene": {"painter.errors", "painter.resources", "painter.typed_yaml"},
     "painter.canopen": set(),
     "painter.canopen.protocol": {"painter.errors"},
-    "painter.canopen.config": {"painter.canopen.protocol", "painter.errors"},
+    "painter.canopen.config": {
+        "painter.canopen.protocol",
+        "painter.errors",
+        "painter.typed_yaml",
+    },
     "painter.canopen.wire": {
         "painter.canopen.config",
         "painter.canopen.protocol",
@@ -360,6 +366,7 @@ PYDRAKE: dict[str, set[str]] = {
     "painter.canopen": set(),
     "painter.errors": set(),
     "painter.timebase": set(),
+    "painter.typed_yaml": set(),
 }
 
 # The bus and the cameras belong to the robot's side: simulation runs without them.

@@ -6,9 +6,9 @@ import yaml
 
 from painter.canopen.config.bus_config import BusConfig, DriveConfig, HomingKind
 from painter.canopen.config.device import DeviceDescription, Mode
-from painter.canopen.config.typed_yaml import read_typed
 from painter.canopen.config.units import AXES, VelocityUnit
 from painter.errors import InputError
+from painter.typed_yaml import read_typed
 
 
 def load_bus(path: Path) -> BusConfig:

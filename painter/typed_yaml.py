@@ -6,11 +6,14 @@ text) and turns its tree of errors into one line: the first one with its field.
 
 import dataclasses
 import enum
+import re
 import typing
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import cattrs
+from cattrs.cols import list_structure_factory
+from cattrs.errors import IterableValidationNote
 from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn
 
 T = TypeVar("T")
@@ -21,15 +24,18 @@ _EXPECTED = {
     str: "text",
     bool: "true or false",
 }
-_CONVERTER = cattrs.Converter()
+# PyYAML reads a number without a point, such as 1e-5, as text; YAML 1.2 does not.
+_EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+")
+CONVERTER = cattrs.Converter()
+"""Builds the values; a module may register how further types are read."""
 
 
 def read_typed(schema: type[T], data: object) -> T:
     """Makes a `schema` of YAML data.
 
     Args:
-        schema: A dataclass whose fields are numbers, text, enums of text, dataclasses
-            or dictionaries of these.
+        schema: A dataclass whose fields are numbers, text, enums of text, dataclasses,
+            or lists or dictionaries of these.
         data: What the YAML reader returned.
 
     Returns:
@@ -40,7 +46,7 @@ def read_typed(schema: type[T], data: object) -> T:
             value and what is expected.
     """
     try:
-        return _CONVERTER.structure(data, schema)
+        return CONVERTER.structure(data, schema)
     except (cattrs.BaseValidationError, ValueError) as error:
         raise ValueError(_describe(error)) from None
 
@@ -49,15 +55,15 @@ def _is_record(kind: Any) -> bool:
     return dataclasses.is_dataclass(kind) or typing.get_origin(kind) is dict
 
 
-@_CONVERTER.register_structure_hook_factory(_is_record)
+@CONVERTER.register_structure_hook_factory(_is_record)
 def _record_reader(kind: Any) -> Callable[[object, Any], Any]:
     build: Callable[[Any, Any], Any]
     if dataclasses.is_dataclass(kind):
         build = make_dict_structure_fn(
-            typing.cast(type[Any], kind), _CONVERTER, _cattrs_forbid_extra_keys=True
+            typing.cast(type[Any], kind), CONVERTER, _cattrs_forbid_extra_keys=True
         )
     else:
-        build = make_mapping_structure_fn(kind, _CONVERTER)
+        build = make_mapping_structure_fn(kind, CONVERTER)
 
     def read(data: object, _: Any) -> Any:
         if data is None:  # A key with nothing behind it.
@@ -69,7 +75,25 @@ def _record_reader(kind: Any) -> Callable[[object, Any], Any]:
     return read
 
 
+def _is_list(kind: Any) -> bool:
+    return typing.get_origin(kind) is list
+
+
+@CONVERTER.register_structure_hook_factory(_is_list)
+def _list_reader(kind: Any) -> Callable[[object, Any], Any]:
+    build = list_structure_factory(kind, CONVERTER)
+
+    def read(data: object, _: Any) -> Any:
+        if not isinstance(data, list):
+            raise ValueError(f"must be a list, got {data!r}.")
+        return build(data, kind)
+
+    return read
+
+
 def _read_scalar(data: object, kind: type) -> Any:
+    if kind is float and isinstance(data, str) and _EXPONENT.fullmatch(data):
+        return float(data)
     fits = isinstance(data, (int, float) if kind is float else kind)
     if not fits or (isinstance(data, bool) and kind is not bool):
         raise ValueError(f"must be {_EXPECTED[kind]}, got {data!r}.")
@@ -83,8 +107,8 @@ def _read_enum(data: object, kind: type[enum.StrEnum]) -> enum.StrEnum:
 
 
 for _kind in _EXPECTED:
-    _CONVERTER.register_structure_hook(_kind, _read_scalar)
-_CONVERTER.register_structure_hook(enum.StrEnum, _read_enum)
+    CONVERTER.register_structure_hook(_kind, _read_scalar)
+CONVERTER.register_structure_hook(enum.StrEnum, _read_enum)
 
 
 def _describe(error: BaseException, field: str = "") -> str:
@@ -93,8 +117,12 @@ def _describe(error: BaseException, field: str = "") -> str:
         first = error.exceptions[0]
         # cattrs notes where in the data an error happened: a field, or a key.
         for note in getattr(first, "__notes__", ()):
-            name = getattr(note, "name", getattr(note, "index", ""))
-            field = f"{field}.{name}" if field else str(name)
+            if isinstance(note, IterableValidationNote):
+                is_item = isinstance(note.index, int)
+                name = f"[{note.index}]" if is_item else f".{note.index}"
+            else:
+                name = f".{note.name}"
+            field = (field + name).removeprefix(".")
         return _describe(first, field)
     if isinstance(error, cattrs.ForbiddenExtraKeysError):
         known = ", ".join(f.name for f in dataclasses.fields(error.cl))

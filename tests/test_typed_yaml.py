@@ -4,8 +4,9 @@ import dataclasses
 import enum
 
 import pytest
+import yaml
 
-from painter.canopen.config.typed_yaml import read_typed
+from painter.typed_yaml import read_typed
 
 
 class Colour(enum.StrEnum):
@@ -26,6 +27,7 @@ class Whole:
     name: str = "none"
     is_new: bool = False
     spare: Part = dataclasses.field(default_factory=lambda: Part(size=0.0))
+    corners: list[list[float]] = dataclasses.field(default_factory=list)
 
 
 def test_values_have_the_types_of_their_fields():
@@ -38,6 +40,14 @@ def test_values_have_the_types_of_their_fields():
     )
     assert isinstance(whole.parts["a"].size, float)
     assert isinstance(whole.parts["a"].colour, Colour)
+
+
+def test_a_number_without_a_point_is_a_number():
+    """YAML 1.2, 10.3.2; PyYAML reads 1.1, where 1e-5 is text."""
+    data = yaml.safe_load("{parts: {a: {size: 1e-5}}, corners: [[1e3, -2E+1]]}")
+    whole = read_typed(Whole, data)
+    assert whole.parts["a"].size == 1e-5
+    assert whole.corners == [[1000.0, -20.0]]
 
 
 def test_a_key_without_a_value_has_no_fields():
@@ -69,9 +79,19 @@ def test_a_key_without_a_value_has_no_fields():
         ({"parts": {}, "name": 7}, "name must be text, got 7."),
         ({"parts": {}, "is_new": 1}, "is_new must be true or false, got 1."),
         ({"parts": {}, "spare": None}, "spare.size is missing."),
+        ({"parts": {}, "corners": "ab"}, "corners must be a list, got 'ab'."),
+        ({"parts": {}, "corners": [1]}, "corners[0] must be a list, got 1."),
+        (
+            {"parts": {}, "corners": [[0, 0], [1, "b"]]},
+            "corners[1][1] must be a number, got 'b'.",
+        ),
+        (
+            {"parts": {"a": {"size": "1e-"}}},
+            "parts.a.size must be a number, got '1e-'.",
+        ),
         (
             {"parts": {}, "other": 1},
-            "other is unknown; known are: parts, name, is_new, spare.",
+            "other is unknown; known are: parts, name, is_new, spare, corners.",
         ),
     ],
 )
