@@ -208,7 +208,7 @@ def test_what_was_there_before_stays_and_counts():
 
 
 def test_film_of_another_grid_is_refused():
-    with pytest.raises(ValueError, match=r"\(20, 20\) cells .* cannot go on"):
+    with pytest.raises(ValueError, match=r"\(20, 20\) cells .* must lie on"):
         paint([0.0, 0.1], np.zeros((2, 3)), [], before=film_of(np.zeros((20, 20))))
 
 
