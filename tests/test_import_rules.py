@@ -29,6 +29,7 @@ SYSTEM_VALUES = {
     "painter.systems.cycle_state",
     "painter.systems.ports",
     "painter.systems.stage",
+    "painter.systems.value_system",
     "painter.systems.values",
 }
 

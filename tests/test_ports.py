@@ -17,11 +17,12 @@ from painter.cycle.true_wall import true_segmentation
 from painter.diagrams.paint_cycle import MakePaintCycle
 from painter.planning.program.remainder import Remainder
 from painter.systems.stage import Stage
+from painter.systems.value_system import ValueSystem
 from tests.hil import Loop
 
 MARK = ".. pydrake_system::"
 # Bases that never stand in a diagram themselves.
-BASES = {Stage}
+BASES = {Stage, ValueSystem}
 
 
 def declared_classes() -> list[type[LeafSystem]]:

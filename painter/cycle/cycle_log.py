@@ -7,27 +7,24 @@ import numpy.typing as npt
 
 from painter.planning.arm.kinematics import ArmKinematics
 from painter.planning.spray_path import PaintProgram
+from painter.run.folder.values import Executed
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import (
     CycleStatus,
 )
-from perception.ground import FloatArray, FrozenValue
+from perception.ground import FloatArray
 from perception.values import SurfaceMap, WallSegmentation
 
 
 @dataclass(frozen=True, eq=False)
-class CycleLog(FrozenValue):
+class CycleLog(Executed):
     """The log of a cycle; results that it did not reach are None.
+
+    On the robot X_WG is measured; in simulation it is the true pose.
 
     Attributes:
         status: The cycle's last status, with all events.
         end_time: Robot time at which the simulation stopped, s.
-        time: (n,) s, of the samples below.
-        q: (n, 5) rad, measured.
-        v: (n, 5) rad/s, measured.
-        trigger: (n,) as the gun received it.
-        X_WG: (n, 4, 4) nozzle poses in W: true, or measured if unknown.
-        X_WG_desired: (n, 4, 4) nozzle poses of the desired joint state.
         clearance_time: (k,) s; empty where clearances are unknown.
         clearance: (k,) m, least distance of the robot from the scene.
         floor_clearance: (k,) m, the same from the floor and the robot's own frame.
@@ -40,12 +37,6 @@ class CycleLog(FrozenValue):
 
     status: CycleStatus
     end_time: float
-    time: FloatArray
-    q: FloatArray
-    v: FloatArray
-    trigger: FloatArray
-    X_WG: FloatArray
-    X_WG_desired: FloatArray
     clearance_time: FloatArray
     clearance: FloatArray
     floor_clearance: FloatArray

@@ -49,7 +49,7 @@ def DeployCycle(
         watch: Called every WATCH_PERIOD as `SimulateCycle` does.
         interruption: Returns why to stop the arm now, or None; the cycle then ends in
             ABORTED.
-        own: Systems of your own; see `MakePaintCycle`.
+        own: Systems of one's own; see `MakePaintCycle`.
 
     Returns:
         The log of the cycle, whether it came to DONE or not; without film and

@@ -13,31 +13,20 @@ from painter.cycle.cycle_log import GunPoses
 from painter.diagrams.hardware_station import MakeHardwareStation, RobotConnection
 from painter.planning.arm.kinematics import NQ
 from painter.robot.robot_model import MakeRobotModel
+from painter.run.folder.values import Executed
 from painter.systems.ports import EvalAs
 from painter.systems.values import ArmStatus
 from perception.ground import FloatArray
 
 
-@dataclass(frozen=True)
-class Replay:
-    """What the station saw of a log.
+@dataclass(frozen=True, eq=False)
+class Replay(Executed):
+    """What the station saw of a log; times from when the drives were first enabled.
 
     Attributes:
-        time: (n,) s, from when the drives were first enabled.
-        q: (n, 5) rad, measured.
-        v: (n, 5) rad/s, measured.
-        trigger: (n,) 0 to 1, as commanded to the gun.
-        X_WG: (n, 4, 4) pose of the gun.
-        X_WG_desired: (n, 4, 4) pose commanded at the same times.
         stops: Time, s, and cause of each new stop in the station's status.
     """
 
-    time: FloatArray
-    q: FloatArray
-    v: FloatArray
-    trigger: FloatArray
-    X_WG: FloatArray
-    X_WG_desired: FloatArray
     stops: tuple[tuple[float, str], ...]
 
 

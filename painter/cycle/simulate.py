@@ -38,7 +38,7 @@ def SimulateCycle(
         meshcat: Where to show it, or None.
         watch: Called every WATCH_PERIOD of robot time with the time, s, and the status
             of cycle and follower; may return a command of the operator.
-        own: Systems of your own; see `MakePaintCycle`.
+        own: Systems of one's own; see `MakePaintCycle`.
 
     Returns:
         The log of the cycle, whether it came to DONE or not.

@@ -11,7 +11,7 @@ from painter.planning.zones import points_in_zones
 from painter.robot.true_scene import true_scene
 from painter.run.figures.predicted_film import run_preview
 from painter.run.folder.folder import LOOK, RunFolder
-from painter.run.folder.values import Executed, Film, Truth
+from painter.run.folder.values import Film, Truth
 from painter.scene.surface import height_field, is_paintable, surface_at
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
@@ -41,16 +41,7 @@ def write_log(
         folder, scenario, log.clearance_time, log.clearance, log.floor_clearance
     )
     folder.save_map(log.surface_map)
-    folder.save_executed(
-        Executed(
-            time=log.time,
-            q=log.q,
-            v=log.v,
-            trigger=log.trigger,
-            X_WG=log.X_WG,
-            X_WG_desired=log.X_WG_desired,
-        )
-    )
+    folder.save_executed(log)
     if log.look_image is not None:
         Image.fromarray(log.look_image[:, :, :3]).save(folder.path / LOOK)
     if log.segmentation is None:

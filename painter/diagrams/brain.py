@@ -1,6 +1,6 @@
 """The brain: mapping, segmentation, planning and the sequence of the cycle."""
 
-from typing import TypedDict
+from typing import TypedDict, Unpack
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -78,13 +78,33 @@ JOINT_HISTORY = 4.0
 
 
 class OwnSystems(TypedDict, total=False):
-    """Systems that replace the brain's own; see `MakeBrain`."""
+    """Systems of one's own in place of the brain's.
 
-    finder: LeafSystem | None
-    segmenter: LeafSystem | None
-    planner: LeafSystem | None
-    mover: LeafSystem | None
-    accumulator: LeafSystem | None
+    Any LeafSystem with the ports of the system that it replaces may be given, derived
+    from `painter.systems.stage.Stage` or not.
+
+    Attributes:
+        finder: Replaces the WallFinder.
+        segmenter: Replaces the WallSegmenter.
+        planner: Replaces the SprayPathPlanner.
+        mover: Replaces the MotionPlanner.
+        accumulator: Replaces the MapAccumulator.
+    """
+
+    finder: LeafSystem
+    segmenter: LeafSystem
+    planner: LeafSystem
+    mover: LeafSystem
+    accumulator: LeafSystem
+
+
+REPLACED = {
+    "finder": "wall_finder",
+    "segmenter": "wall_segmenter",
+    "planner": "spray_path_planner",
+    "mover": "motion_planner",
+    "accumulator": "map_accumulator",
+}
 
 
 def MakeBrain(
@@ -92,27 +112,16 @@ def MakeBrain(
     robot: RobotModel,
     *,
     remainder: Remainder | None = None,
-    finder: LeafSystem | None = None,
-    segmenter: LeafSystem | None = None,
-    planner: LeafSystem | None = None,
-    mover: LeafSystem | None = None,
-    accumulator: LeafSystem | None = None,
+    **own: Unpack[OwnSystems],
 ) -> Diagram:
     """Makes the brain, the same on both bodies.
-
-    Any LeafSystem with the ports of the system that it replaces may be given, derived
-    from `painter.systems.stage.Stage` or not.
 
     Args:
         scenario: The job.
         robot: The job's robot.
         remainder: Strokes left to paint on a wall known from an earlier run; None =
             scan the wall and paint all of it.
-        finder: Replaces the WallFinder.
-        segmenter: Replaces the WallSegmenter.
-        planner: Replaces the SprayPathPlanner.
-        mover: Replaces the MotionPlanner.
-        accumulator: Replaces the MapAccumulator.
+        own: See `OwnSystems`.
 
     Returns:
         A diagram with the inputs INPUTS and the outputs OUTPUTS. `operator`
@@ -120,10 +129,11 @@ def MakeBrain(
 
     Raises:
         PortTypeError: A given system has other ports than the one that it replaces.
-        ValueError: With a `remainder` wall and strokes are known: finder, segmenter and
-            planner must be None.
+        TypeError: A keyword is unknown.
+        ValueError: With a `remainder` wall and strokes are known: no finder, segmenter
+            or planner may be given.
     """
-    if remainder is not None and (finder or segmenter or planner):
+    if remainder is not None and own.keys() & {"finder", "segmenter", "planner"}:
         raise ValueError(
             "remainder: wall and strokes are known; give no finder, segmenter, planner."
         )
@@ -139,16 +149,13 @@ def MakeBrain(
             sequence=SEQUENCE if remainder is None else KNOWN_WALL_SEQUENCE,
         ),
     } | _MakeStages(scenario, robot, remainder)
-    for name, own in {
-        "wall_finder": finder,
-        "wall_segmenter": segmenter,
-        "spray_path_planner": planner,
-        "motion_planner": mover,
-        "map_accumulator": accumulator,
-    }.items():
-        if own is not None:
-            _CheckOwn(name, own)
-            systems[name] = own
+    unknown = own.keys() - REPLACED.keys()
+    if unknown:
+        raise TypeError(f"{', '.join(unknown)}: replace {', '.join(REPLACED)} alone.")
+    for keyword, system in own.items():
+        name = REPLACED[keyword]
+        _CheckOwn(name, system)
+        systems[name] = system
     diagram = _Connect(systems)
     diagram.set_name("brain")
     return diagram

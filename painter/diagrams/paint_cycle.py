@@ -56,8 +56,8 @@ def MakePaintCycle(
         remainder: See `MakeBrain`.
         film: Film that is on the wall already; simulation only. None = none.
         meshcat: Where to show it, or None.
-        own: `finder`, `segmenter`, `planner`, `mover`, `accumulator`: systems of your
-            own in place of the brain's; see `MakeBrain` and docs/own-stage.md.
+        own: `finder`, `segmenter`, `planner`, `mover`, `accumulator`: systems of one's
+            own in place of the brain's; see `OwnSystems` and docs/own-stage.md.
 
     Raises:
         PortTypeError: A given system has other ports than the one that it replaces.

@@ -99,17 +99,34 @@ def AddSurroundings(
         film: Film that is on the wall already; None = none.
     """
     camera = _AddWallCamera(builder, plant, scene_graph, scenario)
-    _AddGun(
-        builder,
-        plant,
-        scenario,
-        camera,
-        scene=scene,
-        X_WS=X_WS,
-        state=state,
-        before=film,
-    )
     _AddClearance(builder, plant, scene_graph)
+    surface = height_field(
+        scene,
+        cell=FILM_CELL,
+        margin=FILM_MARGIN,
+        width=scenario.tile.width,
+        height=scenario.tile.height,
+    )
+    paint = builder.AddNamedSystem(
+        "paint_film",
+        PaintFilm(
+            height=surface.height,
+            cell=surface.cell,
+            origin=surface.origin,
+            X_WS=X_WS,
+            tip=scenario.gun.tip,
+            before=film,
+        ),
+    )
+    gun = builder.AddNamedSystem(
+        "gun_pose", GunPose(kinematics=GetArmKinematics(plant))
+    )
+    builder.Connect(state, gun.GetInputPort("state"))
+    builder.Connect(gun.GetOutputPort("X_WG"), paint.GetInputPort("X_WG"))
+    builder.ExportInput(paint.GetInputPort("trigger"), "gun.trigger")
+    builder.ConnectInput("gun.trigger", camera.GetInputPort("gun_trigger"))
+    builder.ExportOutput(gun.GetOutputPort("X_WG"), "cheat.X_WG")
+    builder.ExportOutput(paint.GetOutputPort("film"), "cheat.film")
 
 
 def _AddClearance(
@@ -203,44 +220,3 @@ def _AddWallCamera(
     for port in ("depth_image", "image_time"):
         builder.ExportOutput(stereo.GetOutputPort(port), f"wall_camera.{port}")
     return stereo
-
-
-def _AddGun(
-    builder: DiagramBuilder,
-    plant: MultibodyPlant,
-    scenario: Scenario,
-    camera: StereoCamera,
-    *,
-    scene: Scene,
-    X_WS: RigidTransform,
-    state: OutputPort,
-    before: FilmState | None,
-) -> None:
-    """Adds the paint film on the scene's true surface."""
-    surface = height_field(
-        scene,
-        cell=FILM_CELL,
-        margin=FILM_MARGIN,
-        width=scenario.tile.width,
-        height=scenario.tile.height,
-    )
-    film = builder.AddNamedSystem(
-        "paint_film",
-        PaintFilm(
-            height=surface.height,
-            cell=surface.cell,
-            origin=surface.origin,
-            X_WS=X_WS,
-            tip=scenario.gun.tip,
-            before=before,
-        ),
-    )
-    gun = builder.AddNamedSystem(
-        "gun_pose", GunPose(kinematics=GetArmKinematics(plant))
-    )
-    builder.Connect(state, gun.GetInputPort("state"))
-    builder.Connect(gun.GetOutputPort("X_WG"), film.GetInputPort("X_WG"))
-    builder.ExportInput(film.GetInputPort("trigger"), "gun.trigger")
-    builder.ConnectInput("gun.trigger", camera.GetInputPort("gun_trigger"))
-    builder.ExportOutput(gun.GetOutputPort("X_WG"), "cheat.X_WG")
-    builder.ExportOutput(film.GetOutputPort("film"), "cheat.film")

@@ -12,7 +12,6 @@ from painter.config import Scenario
 from painter.cycle.log_replay import ReplayLog
 from painter.errors import InputError
 from painter.run.folder.arrays import save_executed
-from painter.run.folder.values import Executed
 
 
 def replay_bus_log(log: Path, bus: BusConfig, folder: Path) -> dict[str, Any]:
@@ -37,17 +36,7 @@ def replay_bus_log(log: Path, bus: BusConfig, folder: Path) -> dict[str, Any]:
             f"{log}: {str(error).removeprefix(f'{log}: ')}", code="PNT-USE-008"
         ) from error
     found = ReplayLog(Scenario(), played, bus.cycle)
-    save_executed(
-        folder / "executed.npz",
-        Executed(
-            time=found.time,
-            q=found.q,
-            v=found.v,
-            trigger=found.trigger,
-            X_WG=found.X_WG,
-            X_WG_desired=found.X_WG_desired,
-        ),
-    )
+    save_executed(folder / "executed.npz", found)
     p_WG, p_WG_desired = found.X_WG[:, :3, 3], found.X_WG_desired[:, :3, 3]
     lag = np.linalg.norm(p_WG - p_WG_desired, axis=1)
     steps = np.linalg.norm(np.diff(p_WG, axis=0), axis=1)

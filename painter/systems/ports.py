@@ -72,54 +72,54 @@ def CheckPorts(
 
     Raises:
         PortTypeError: A port is missing, unknown or of another kind, size or type; the
-            message lists all of them and what is expected.
+            message lists them and all that are expected.
     """
     expected = {
-        (side, name): _kind_name(example)
+        f"{side} {name}": _kind_name(example)
         for side, ports in (("input", inputs), ("output", outputs))
         for name, example in ports.items()
     }
     found = {
-        key: kind
-        for key, kind in _PortKinds(system).items()
-        if key[0] == "input" or not key[1].startswith(ignored)
+        port: kind
+        for port, kind in _PortKinds(system).items()
+        if not port.startswith(f"output {ignored}")
     }
-    problems = [f"no {side} {name}" for side, name in expected.keys() - found.keys()]
-    problems += [f"unknown {side} {name}" for side, name in found.keys() - expected]
-    problems += [
-        f"{key[0]} {key[1]} is {found[key]}, not {expected[key]}"
-        for key in expected.keys() & found.keys()
-        if found[key] != expected[key]
-    ]
-    if problems:
-        contract = ", ".join(f"{key[0]} {key[1]}: {expected[key]}" for key in expected)
+    if found != expected:
+        lacking, excess = (
+            ", ".join(f"{port} ({kind})" for port, kind in sorted(items)) or "none"
+            for items in (
+                expected.items() - found.items(),
+                found.items() - expected.items(),
+            )
+        )
+        contract = ", ".join(f"{port} ({kind})" for port, kind in expected.items())
         raise PortTypeError(
-            f"{owner} {type(system).__name__}: {'; '.join(sorted(problems))}. "
-            f"Expected {contract}.",
+            f"{owner} {type(system).__name__}: missing ports: {lacking}; wrong ports: "
+            f"{excess}. Expected are {contract}.",
             code="PNT-CYCLE-012",
         )
 
 
-def _PortKinds(system: System) -> dict[tuple[str, str], str]:
-    """Returns what each port carries, by side and name."""
+def _PortKinds(system: System) -> dict[str, str]:
+    """Returns what each port carries, by "input NAME" or "output NAME"."""
     ports = [system.get_input_port(i) for i in range(system.num_input_ports())]
     ports += [system.get_output_port(i) for i in range(system.num_output_ports())]
     kinds = {}
     for port in ports:
-        side = "input" if isinstance(port, InputPort) else "output"
+        is_input = isinstance(port, InputPort)
         if port.get_data_type() == PortDataType.kVectorValued:
-            kind = _kind_name(port.size())
-        elif side == "input":
-            kind = _kind_name(system.AllocateInputAbstract(port).get_value())
+            example: Any = port.size()
+        elif is_input:
+            example = system.AllocateInputAbstract(port).get_value()
         else:
-            kind = _kind_name(port.Allocate().get_value())
-        kinds[side, port.get_name()] = kind
+            example = port.Allocate().get_value()
+        side = "input" if is_input else "output"
+        kinds[f"{side} {port.get_name()}"] = _kind_name(example)
     return kinds
 
 
 def _kind_name(example: Any) -> str:
     """Names a vector by its size, another value by its type."""
     if isinstance(example, int):
-        return f"a vector of {example}"
-    kind = type(example)
-    return f"{kind.__module__}.{kind.__name__}"
+        return f"vector of {example}"
+    return f"{type(example).__module__}.{type(example).__name__}"

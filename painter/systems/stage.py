@@ -8,13 +8,13 @@ import time
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from pydrake.common.value import Value
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, State
 
 from painter.errors import PainterError
 from painter.planning.arm.kinematics import NQ
 from painter.planning.spray_path import Motion, PaintProgram
 from painter.systems.ports import DeclareInputs, EvalAs, Ports
+from painter.systems.value_system import ValueSystem
 from painter.systems.values import StageRequest, StageResult
 from perception.errors import PerceptionError
 from perception.values import SurfaceMap, Wall, WallSegmentation
@@ -53,7 +53,7 @@ STAGES = {
 the output `result` (StageResult)."""
 
 
-class Stage(LeafSystem):
+class Stage(ValueSystem):
     """Base of the systems that do one heavy piece of work when the cycle requests it.
 
     .. pydrake_system::
@@ -91,9 +91,9 @@ class Stage(LeafSystem):
         self._kinds = {"request": StageRequest(), **ports}
         self._ports = DeclareInputs(self, self._kinds)
         # State.
-        self._result_index = self.DeclareAbstractState(Value(StageResult()))
+        self.DeclareValue(StageResult())
         # Outputs.
-        self.DeclareStateOutputPort("result", self._result_index)
+        self.DeclareValueOutput("result", lambda result: result)
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateResult)
 
@@ -150,9 +150,8 @@ class Stage(LeafSystem):
 
     def _UpdateResult(self, context: Context, state: State) -> EventStatus:
         request: StageRequest = self.Read(context, "request")
-        index = int(self._result_index)
-        last: StageResult = context.get_abstract_state(index).get_value()
-        if request.stage != self._stage or request.number == last.number:
+        last = self.GetValue(context).number
+        if request.stage != self._stage or request.number == last:
             return EventStatus.DidNothing()
         start = time.perf_counter()
         result = StageResult(number=request.number)
@@ -163,5 +162,4 @@ class Stage(LeafSystem):
             error = f"{type(failure).__name__}: {failure}"
             result = result.replace(error=error, code=failure.code)
         result = result.replace(compute_time=time.perf_counter() - start)
-        state.get_mutable_abstract_state(index).set_value(result)
-        return EventStatus.Succeeded()
+        return self.SetValue(state, result)

@@ -40,7 +40,7 @@ def test_a_station_with_other_ports_is_refused():
     builder = DiagramBuilder()
     source = builder.AddSystem(ConstantVectorSource([0.0]))
     builder.ExportOutput(source.get_output_port(), "arm.status")
-    with pytest.raises(PortTypeError, match=r"no input arm.desired_state"):
+    with pytest.raises(PortTypeError, match=r"missing ports: input arm.desired_state"):
         CheckStation(builder.Build())
 
 

@@ -118,19 +118,29 @@ def test_a_system_with_the_ports_is_taken_whatever_its_base():
     [
         (
             Foreign(wall=3),
-            "input wall is a vector of 3, not painter.systems.values.StageResult",
+            r"missing ports: input wall \(painter.systems.values.StageResult\); "
+            r"wrong ports: input wall \(vector of 3\)\.",
         ),
-        (Foreign(wall=WALL), "input wall is perception.values.Wall, not painter"),
-        (Foreign(result="answer"), "no output result; unknown output answer"),
-        (Foreign(more=["speed"]), "segmenter Foreign: unknown input speed. Expected"),
-        (Counting(), "segmenter Counting: no input wall. Expected input request"),
+        (Foreign(wall=WALL), r"wrong ports: input wall \(perception.values.Wall\)\."),
+        (
+            Foreign(result="answer"),
+            r"missing ports: output result .*; wrong ports: output answer ",
+        ),
+        (
+            Foreign(more=["speed"]),
+            r"segmenter Foreign: missing ports: none; wrong ports: input speed ",
+        ),
+        (
+            Counting(),
+            r"Counting: missing ports: input wall .*; wrong ports: none\. Expected",
+        ),
     ],
 )
 def test_each_wrong_port_is_named_with_what_is_expected(system, problem):
     with pytest.raises(PortTypeError, match=problem) as caught:
         check(system)
     assert caught.value.code == "PNT-CYCLE-012"
-    assert "output result: painter.systems.values.StageResult" in str(caught.value)
+    assert "output result (painter.systems.values.StageResult)" in str(caught.value)
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +169,11 @@ def test_the_brain_takes_a_system_of_ones_own(job):
     brain = MakeBrain(*job, segmenter=own)
     assert brain.GetSubsystemByName("wall_segmenter") is own
     assert own.get_name() == "wall_segmenter"
+
+
+def test_an_unknown_keyword_is_refused(job):
+    with pytest.raises(TypeError, match="segmentor: replace finder, segmenter, "):
+        MakeBrain(*job, segmentor=Foreign())
 
 
 def test_a_known_wall_takes_no_segmenter(job):

@@ -1,5 +1,6 @@
 """Arrays of a run on disk: .npz files and the map as .ply."""
 
+import dataclasses
 import os
 import zipfile
 import zlib
@@ -34,7 +35,8 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def save_executed(path: Path, executed: Executed) -> None:
     """Writes executed.npz."""
-    _save(path, vars(executed))
+    names = (field.name for field in dataclasses.fields(Executed))
+    _save(path, {name: getattr(executed, name) for name in names})
 
 
 def load_executed(path: Path) -> Executed:

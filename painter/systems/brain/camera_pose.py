@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, State
 
 from painter.errors import PainterError
 from painter.planning.arm.kinematics import NQ, ArmKinematics
+from painter.systems.value_system import ValueSystem
 from perception.ground import FloatArray, FrozenValue
 
 
@@ -48,7 +49,7 @@ class JointHistory(FrozenValue):
         return np.array([np.interp(time, self.time, joint) for joint in self.q.T])
 
 
-class CameraPose(LeafSystem):
+class CameraPose(ValueSystem):
     """Gives the pose of the camera at the time of its last picture.
 
     .. pydrake_system::
@@ -102,7 +103,7 @@ class CameraPose(LeafSystem):
         self._state_port = self.DeclareVectorInputPort("state", 2 * NQ)
         self._time_port = self.DeclareVectorInputPort("image_time", 1)
         # State.
-        self._history_index = self.DeclareAbstractState(Value(JointHistory.empty()))
+        self.DeclareValue(JointHistory.empty())
         # Outputs.
         self.DeclareAbstractOutputPort(
             "X_WC",
@@ -111,16 +112,16 @@ class CameraPose(LeafSystem):
             prerequisites_of_calc={
                 self._state_port.ticket(),
                 self._time_port.ticket(),
-                self.abstract_state_ticket(self._history_index),
                 self.time_ticket(),
-            },
+            }
+            | self.value_tickets,
         )
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateHistory)
 
     def _History(self, context: Context) -> JointHistory:
         """Returns the history including the present sample."""
-        history = context.get_abstract_state(int(self._history_index)).get_value()
+        history: JointHistory = self.GetValue(context)
         q = self._state_port.Eval(context)[:NQ]
         return history.append(context.get_time(), q, length=self._length)
 
@@ -142,6 +143,4 @@ class CameraPose(LeafSystem):
         output.set_value(X_WN @ self._X_NC)
 
     def _UpdateHistory(self, context: Context, state: State) -> EventStatus:
-        index = int(self._history_index)
-        state.get_mutable_abstract_state(index).set_value(self._History(context))
-        return EventStatus.Succeeded()
+        return self.SetValue(state, self._History(context))

@@ -5,18 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, State
 from pydrake.systems.sensors import ImageDepth16U
 
 from painter.planning.config import TileConfig
 from painter.systems.ports import EvalAs
+from painter.systems.value_system import ValueSystem
 from painter.systems.values import StageResult
 from perception.config import MapConfig
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FrozenValue
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.sessions.live_map import LiveMap
-from perception.values import SurfaceMap, Wall
+from perception.values import Wall
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class MapProgress(FrozenValue):
     wall_number: int = 0
 
 
-class MapAccumulator(LeafSystem):
+class MapAccumulator(ValueSystem):
     """Fuses depth pictures into one map in the wall's tile frame.
 
     .. pydrake_system::
@@ -105,32 +106,18 @@ class MapAccumulator(LeafSystem):
         empty = LiveMap.empty(
             X_WT, (tile.width, tile.height), config, intrinsics, pose_graph
         )
-        self._progress_index = self.DeclareAbstractState(Value(MapProgress(empty)))
-        # Outputs.
-        self.DeclareAbstractOutputPort(
-            "surface_map",
-            lambda: Value(SurfaceMap.empty()),
-            self._CalcSurfaceMap,
-            prerequisites_of_calc={self.abstract_state_ticket(self._progress_index)},
-        )
+        self.DeclareValue(MapProgress(empty))
+        # Outputs. The map caches its surface itself: every event clears Drake's cache.
+        self.DeclareValueOutput("surface_map", lambda now: now.map.surface_map)
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateMap)
 
-    def _Progress(self, context: Context) -> MapProgress:
-        return context.get_abstract_state(int(self._progress_index)).get_value()
-
-    def _CalcSurfaceMap(self, context: Context, output: Value) -> None:
-        # The map caches its surface itself: every event clears Drake's cache.
-        output.set_value(self._Progress(context).map.surface_map)
-
     def _UpdateMap(self, context: Context, state: State) -> EventStatus:
-        before = self._Progress(context)
+        before: MapProgress = self.GetValue(context)
         progress = self._Fuse(context, self._Restart(context, before))
         if progress is before:
             return EventStatus.DidNothing()
-        index = int(self._progress_index)
-        state.get_mutable_abstract_state(index).set_value(progress)
-        return EventStatus.Succeeded()
+        return self.SetValue(state, progress)
 
     def _Restart(self, context: Context, progress: MapProgress) -> MapProgress:
         """Returns an empty map in the tile frame of a newly found wall, if any."""

@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 
-from pydrake.common.value import Value
 from pydrake.systems.framework import (
-    BasicVector,
     Context,
     EventStatus,
-    LeafSystem,
     State,
 )
 
@@ -15,22 +12,21 @@ from painter.planning.spray_path import Motion
 from painter.systems.cycle_state import SEQUENCE, Action, CycleState, CycleStep
 from painter.systems.ports import DeclareInputs, EvalAs
 from painter.systems.stage import STAGES
+from painter.systems.value_system import ValueSystem
 from painter.systems.values import (
     ArmStatus,
-    CycleStatus,
     Fault,
     FollowerStatus,
     MotionCommand,
     OperatorCommand,
     Phase,
-    StageRequest,
     StageResult,
 )
 
 PLANNER = "motion_planner"
 
 
-class PaintCycle(LeafSystem):
+class PaintCycle(ValueSystem):
     """Leads the robot through the phases of one paint cycle.
 
     .. pydrake_system::
@@ -100,52 +96,30 @@ class PaintCycle(LeafSystem):
             },
         )
         # State.
-        self._state_index = self.DeclareAbstractState(Value(CycleState()))
+        self.DeclareValue(CycleState())
         # Outputs.
-        ticket = {self.abstract_state_ticket(self._state_index)}
-        for name, value, calc in (
-            ("request", StageRequest(), self._CalcRequest),
-            ("motion_command", MotionCommand(), self._CalcMotionCommand),
-        ):
-            self.DeclareAbstractOutputPort(name, lambda v=value: Value(v), calc, ticket)
-        self.DeclareVectorOutputPort(
-            "camera_enabled", 1, self._CalcCameraEnabled, ticket
-        )
-        self.DeclareAbstractOutputPort(
-            "cycle_status", lambda: Value(CycleStatus()), self._CalcStatus, ticket
-        )
+        self.DeclareValueOutput("request", lambda now: now.request)
+        self.DeclareValueOutput("motion_command", lambda now: now.command)
+        self.DeclareValueVector("camera_enabled", 1, self._CameraEnabled)
+        self.DeclareValueOutput("cycle_status", lambda now: now.status)
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateCycle)
 
-    def _GetState(self, context: Context) -> CycleState:
-        return context.get_abstract_state(int(self._state_index)).get_value()
-
-    def _CalcRequest(self, context: Context, output: Value) -> None:
-        output.set_value(self._GetState(context).request)
-
-    def _CalcMotionCommand(self, context: Context, output: Value) -> None:
-        output.set_value(self._GetState(context).command)
-
-    def _CalcCameraEnabled(self, context: Context, output: BasicVector) -> None:
-        now = self._GetState(context)
+    def _CameraEnabled(self, now: CycleState) -> list[bool]:
         step = self._sequence[now.step]
         looking = step.action == Action.HOLD or (
             step.phase in (Phase.LOOK, Phase.SCAN) and now.moving
         )
-        output.SetAtIndex(0, float(looking and now.status.phase == step.phase))
-
-    def _CalcStatus(self, context: Context, output: Value) -> None:
-        output.set_value(self._GetState(context).status)
+        return [looking and now.status.phase == step.phase]
 
     def _UpdateCycle(self, context: Context, state: State) -> EventStatus:
-        before = self._GetState(context)
+        before: CycleState = self.GetValue(context)
         if before.status.finished:
             return EventStatus.DidNothing()
         after = self._Next(context, before)
         if after is before:
             return EventStatus.DidNothing()
-        state.get_mutable_abstract_state(int(self._state_index)).set_value(after)
-        return EventStatus.Succeeded()
+        return self.SetValue(state, after)
 
     def _Next(self, context: Context, now: CycleState) -> CycleState:
         """Returns the state after one decision."""

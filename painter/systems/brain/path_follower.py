@@ -9,7 +9,6 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     EventStatus,
-    LeafSystem,
     State,
 )
 
@@ -17,6 +16,7 @@ from painter.errors import MotionLimitError
 from painter.planning.arm.kinematics import NQ
 from painter.planning.spray_path import Motion
 from painter.systems.ports import EvalAs
+from painter.systems.value_system import ValueSystem
 from painter.systems.values import FollowerStatus, MotionCommand
 from perception.ground import FloatArray, FrozenValue
 
@@ -84,7 +84,7 @@ class FollowerState(FrozenValue):
     q_hold: FloatArray
 
 
-class PathFollower(LeafSystem):
+class PathFollower(ValueSystem):
     """Turns a motion command into the arm's desired state and the gun's trigger.
 
     .. pydrake_system::
@@ -133,12 +133,9 @@ class PathFollower(LeafSystem):
         # State.
         clock = PathClock(ramp=ramp)
         empty = FollowerState(0, None, clock, 0.0, np.zeros(NQ))
-        self._state_index = self.DeclareAbstractState(Value(empty))
+        self.DeclareValue(empty)
         # Outputs.
-        time_and_state = {
-            self.time_ticket(),
-            self.abstract_state_ticket(self._state_index),
-        }
+        time_and_state = self.value_tickets | {self.time_ticket()}
         self.DeclareVectorOutputPort(
             "desired_state", 2 * NQ, self._CalcDesiredState, time_and_state
         )
@@ -155,26 +152,19 @@ class PathFollower(LeafSystem):
         self.DeclareInitializationUnrestrictedUpdateEvent(self._UpdateHold)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateMotion)
 
-    def _GetState(self, context: Context) -> FollowerState:
-        return context.get_abstract_state(int(self._state_index)).get_value()
-
-    def _SetState(self, state: State, value: FollowerState) -> EventStatus:
-        state.get_mutable_abstract_state(int(self._state_index)).set_value(value)
-        return EventStatus.Succeeded()
-
     def _UpdateHold(self, context: Context, state: State) -> EventStatus:
         q = self._state_port.Eval(context)[:NQ]
-        return self._SetState(state, self._GetState(context).replace(q_hold=q.copy()))
+        return self.SetValue(state, self.GetValue(context).replace(q_hold=q.copy()))
 
     def _UpdateMotion(self, context: Context, state: State) -> EventStatus:
         command = EvalAs(self._command_port, context, MotionCommand)
-        now = self._GetState(context)
+        now: FollowerState = self.GetValue(context)
         time = context.get_time()
         if command.number != now.number and command.motion is not None:
             self._CheckStart(context, command.motion)
             # A motion starts at rest, so its time may run at full rate at once.
             clock = now.clock.replace(start=time, origin=0.0, rate=1.0, target=1.0)
-            return self._SetState(
+            return self.SetValue(
                 state,
                 FollowerState(command.number, command.motion, clock, 0.0, now.q_hold),
             )
@@ -187,7 +177,7 @@ class PathFollower(LeafSystem):
         if command.rate == 0.0 and clock.target != 0.0:
             done = position if clock.rate == clock.target == 1.0 else now.sprayed_to
             now = now.replace(sprayed_to=max(now.sprayed_to, done))
-            return self._SetState(state, now.replace(clock=clock.turned_to(0.0, time)))
+            return self.SetValue(state, now.replace(clock=clock.turned_to(0.0, time)))
         if command.rate == 1.0 and clock.target != 1.0 and rate == clock.target:
             # Reach full rate before the point where the gun closed.
             run_up = 0.5 * clock.ramp + 0.1
@@ -196,7 +186,7 @@ class PathFollower(LeafSystem):
             target = -1.0 if back else 1.0
             if target != clock.target:
                 clock = clock.turned_to(target, time)
-                return self._SetState(state, now.replace(clock=clock))
+                return self.SetValue(state, now.replace(clock=clock))
         return EventStatus.DidNothing()
 
     def _CheckStart(self, context: Context, motion: Motion) -> None:
@@ -212,7 +202,7 @@ class PathFollower(LeafSystem):
             )
 
     def _CalcDesiredState(self, context: Context, output: BasicVector) -> None:
-        now = self._GetState(context)
+        now: FollowerState = self.GetValue(context)
         if now.motion is None:
             output.SetFromVector(np.concatenate([now.q_hold, np.zeros(NQ)]))
             return
@@ -224,7 +214,7 @@ class PathFollower(LeafSystem):
         output.SetFromVector(np.concatenate([q, v]))
 
     def _CalcTrigger(self, context: Context, output: BasicVector) -> None:
-        now = self._GetState(context)
+        now: FollowerState = self.GetValue(context)
         command = EvalAs(self._command_port, context, MotionCommand)
         opened = 0.0
         if now.motion is not None and command.spray and command.number == now.number:
@@ -234,7 +224,7 @@ class PathFollower(LeafSystem):
         output.SetAtIndex(0, opened)
 
     def _CalcStatus(self, context: Context, output: Value) -> None:
-        now = self._GetState(context)
+        now: FollowerState = self.GetValue(context)
         if now.motion is None:
             output.set_value(FollowerStatus())
             return

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import (
-    BasicVector,
     Context,
     EventStatus,
-    LeafSystem,
     State,
 )
 
@@ -18,6 +16,7 @@ from painter.canopen.process.robot_clock import Bus, RobotClock
 from painter.errors import BusError
 from painter.planning.arm.kinematics import NQ
 from painter.systems.ports import EvalAs
+from painter.systems.value_system import ValueSystem
 from painter.systems.values import ArmStatus, CameraStatus, DriveStatus, Fault
 from perception.ground import FloatArray, FrozenValue
 
@@ -38,7 +37,7 @@ class ArmReading(FrozenValue):
     status: ArmStatus
 
 
-class CanopenArm(LeafSystem):
+class CanopenArm(ValueSystem):
     """Sends setpoints to the bus and reads its measurements.
 
     .. pydrake_system::
@@ -102,33 +101,16 @@ class CanopenArm(LeafSystem):
             "camera_status", Value(CameraStatus())
         )
         # State.
-        self._reading_index = self.DeclareAbstractState(Value(first))
+        self.DeclareValue(first)
         # Outputs.
-        ticket = {self.abstract_state_ticket(self._reading_index)}
-        self.DeclareVectorOutputPort(
-            "state_estimated", 2 * NQ, self._CalcState, prerequisites_of_calc=ticket
-        )
-        self.DeclareAbstractOutputPort(
-            "status",
-            lambda: Value(ArmStatus()),
-            self._CalcStatus,
-            prerequisites_of_calc=ticket,
-        )
+        self.DeclareValueVector("state_estimated", 2 * NQ, lambda now: now.state)
+        self.DeclareValueOutput("status", lambda now: now.status)
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateFromBus)
         self.DeclarePeriodicPublishEvent(period, 0.0, self._PublishSetpoint)
 
-    def _Reading(self, context: Context) -> ArmReading:
-        return context.get_abstract_state(int(self._reading_index)).get_value()
-
-    def _CalcState(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._Reading(context).state)
-
-    def _CalcStatus(self, context: Context, output: Value) -> None:
-        output.set_value(self._Reading(context).status)
-
     def _UpdateFromBus(self, context: Context, state: State) -> EventStatus:
-        last = self._Reading(context)
+        last: ArmReading = self.GetValue(context)
         try:
             report = self._bus.report()
         except BusError as error:
@@ -143,12 +125,10 @@ class CanopenArm(LeafSystem):
             if report is not None:
                 camera = self._CameraFault(context)
                 after = after.replace(status=arm_status(report.feedback, camera))
-        index = int(self._reading_index)
-        state.get_mutable_abstract_state(index).set_value(after)
-        return EventStatus.Succeeded()
+        return self.SetValue(state, after)
 
     def _PublishSetpoint(self, context: Context) -> EventStatus:
-        if self._Reading(context).status.stopped:
+        if self.GetValue(context).status.stopped:
             return EventStatus.DidNothing()
         desired = self._desired_port.Eval(context)
         trigger = float(self._trigger_port.Eval(context)[0])

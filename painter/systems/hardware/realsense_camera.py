@@ -7,16 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import (
-    BasicVector,
     Context,
     EventStatus,
-    LeafSystem,
     State,
 )
 from pydrake.systems.sensors import ImageDepth16U, ImageRgba8U
 
 from painter.camera.frames import CameraFrame
 from painter.camera.reader import CameraHealth, Reading
+from painter.systems.value_system import ValueSystem
 from painter.systems.values import CameraStatus
 from perception.ground import FrozenValue
 
@@ -36,7 +35,7 @@ class CameraPicture(FrozenValue):
     health: CameraHealth = field(default_factory=CameraHealth)
 
 
-class RealsenseCamera(LeafSystem):
+class RealsenseCamera(ValueSystem):
     """Depth camera of the robot; hardware only.
 
     .. pydrake_system::
@@ -95,65 +94,40 @@ class RealsenseCamera(LeafSystem):
         self._diagram_time = diagram_time
         self._color_shape = (color_height, color_width, 3)
         # State.
-        self._picture_index = self.DeclareAbstractState(Value(CameraPicture()))
+        self.DeclareValue(CameraPicture())
         # Outputs.
-        ticket = {self.abstract_state_ticket(self._picture_index)}
         self.DeclareAbstractOutputPort(
             "depth_image",
             lambda: Value(ImageDepth16U(width, height)),
             self._CalcDepthImage,
-            prerequisites_of_calc=ticket,
+            prerequisites_of_calc=self.value_tickets,
         )
         self.DeclareAbstractOutputPort(
             "color_image",
             lambda: Value(ImageRgba8U(color_width, color_height)),
             self._CalcColorImage,
-            prerequisites_of_calc=ticket,
+            prerequisites_of_calc=self.value_tickets,
         )
-        self.DeclareVectorOutputPort(
-            "image_time", 1, self._CalcImageTime, prerequisites_of_calc=ticket
-        )
-        self.DeclareAbstractOutputPort(
-            "status",
-            lambda: Value(CameraStatus()),
-            self._CalcStatus,
-            prerequisites_of_calc=ticket,
-        )
+        self.DeclareValueVector("image_time", 1, lambda now: [now.time])
+        self.DeclareValueOutput("status", lambda now: camera_status(now.health))
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdatePicture)
 
-    def _Picture(self, context: Context) -> CameraPicture:
-        return context.get_abstract_state(int(self._picture_index)).get_value()
-
     def _CalcDepthImage(self, context: Context, output: Value) -> None:
-        frame = self._Picture(context).frame
+        frame = self.GetValue(context).frame
         data = output.get_mutable_value().mutable_data
         data[:, :, 0] = 0 if frame is None else frame.depth_mm
 
     def _CalcColorImage(self, context: Context, output: Value) -> None:
-        frame = self._Picture(context).frame
+        frame = self.GetValue(context).frame
         data = output.get_mutable_value().mutable_data
         data[:, :, 3] = 255
         color = None if frame is None else frame.color
         is_shown = color is not None and color.shape == self._color_shape
         data[:, :, :3] = color if is_shown else 0
 
-    def _CalcImageTime(self, context: Context, output: BasicVector) -> None:
-        output.SetAtIndex(0, self._Picture(context).time)
-
-    def _CalcStatus(self, context: Context, output: Value) -> None:
-        health = self._Picture(context).health
-        output.set_value(
-            CameraStatus(
-                state=health.state.value,
-                problem=health.problem,
-                pictures=health.pictures,
-                dropped=health.repeated + health.late,
-            )
-        )
-
     def _UpdatePicture(self, context: Context, state: State) -> EventStatus:
-        last = self._Picture(context)
+        last: CameraPicture = self.GetValue(context)
         reading = self._read()
         if reading.frame is last.frame and reading.health == last.health:
             return EventStatus.DidNothing()
@@ -168,6 +142,14 @@ class RealsenseCamera(LeafSystem):
             # after its present time is taken at the next check.
             if 0.0 <= taken <= now and taken > last.time:
                 picture = picture.replace(frame=reading.frame, time=taken)
-        index = int(self._picture_index)
-        state.get_mutable_abstract_state(index).set_value(picture)
-        return EventStatus.Succeeded()
+        return self.SetValue(state, picture)
+
+
+def camera_status(health: CameraHealth) -> CameraStatus:
+    """Returns the camera's health as the station reports it."""
+    return CameraStatus(
+        state=health.state.value,
+        problem=health.problem,
+        pictures=health.pictures,
+        dropped=health.repeated + health.late,
+    )

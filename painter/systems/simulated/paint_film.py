@@ -6,12 +6,13 @@ from typing import Self
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import Context, EventStatus, State
 
 from painter.errors import PainterError
 from painter.planning.config import TipConfig
 from painter.planning.film.spray_cone import SprayCone, SpraySurface
 from painter.systems.ports import EvalAs
+from painter.systems.value_system import ValueSystem
 from perception.ground import FloatArray, FrozenValue
 from perception.settings import validate
 
@@ -84,7 +85,7 @@ class FilmState(FrozenValue):
         return float(self.volume.sum())
 
 
-class PaintFilm(LeafSystem):
+class PaintFilm(ValueSystem):
     """Deposits paint on the scene's true surface as the gun moves over it.
 
     .. pydrake_system::
@@ -155,9 +156,9 @@ class PaintFilm(LeafSystem):
                     f"{height.shape} cells of {cell} m from {film.origin} m."
                 )
             film = before
-        self._film_index = self.DeclareAbstractState(Value(film))
+        self.DeclareValue(film)
         # Outputs.
-        self.DeclareStateOutputPort("film", self._film_index)
+        self.DeclareValueOutput("film", lambda film: film)
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._UpdateFilm)
 
@@ -170,11 +171,8 @@ class PaintFilm(LeafSystem):
                 code="PNT-CYCLE-011",
             )
         X_SG = self._X_SW @ EvalAs(self._pose_port, context, RigidTransform)
-        index = int(self._film_index)
-        film: FilmState = context.get_abstract_state(index).get_value()
-        film = self._Sprayed(film, context.get_time(), X_SG, trigger)
-        state.get_mutable_abstract_state(index).set_value(film)
-        return EventStatus.Succeeded()
+        film = self._Sprayed(self.GetValue(context), context.get_time(), X_SG, trigger)
+        return self.SetValue(state, film)
 
     def _Sprayed(
         self, film: FilmState, time: float, X_SG: RigidTransform, trigger: float

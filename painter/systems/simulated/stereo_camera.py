@@ -7,15 +7,14 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.common.value import Value
 from pydrake.systems.framework import (
-    BasicVector,
     Context,
     EventStatus,
-    LeafSystem,
     State,
 )
 from pydrake.systems.sensors import CameraInfo, ImageDepth16U, ImageDepth32F
 
 from painter.systems.ports import EvalAs
+from painter.systems.value_system import ValueSystem
 from perception.config import StereoConfig
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.depth_camera.stereo import StereoModel
@@ -61,7 +60,7 @@ class DepthPicture(FrozenValue):
     spray_time: float = -math.inf
 
 
-class StereoCamera(LeafSystem):
+class StereoCamera(ValueSystem):
     """Depth camera of the simulated station; simulation only.
 
     .. pydrake_system::
@@ -114,39 +113,29 @@ class StereoCamera(LeafSystem):
         self._trigger_port = self.DeclareVectorInputPort("gun_trigger", 1)
         # State.
         blank = np.zeros((config.height, config.width), dtype=np.uint16)
-        self._picture_index = self.DeclareAbstractState(Value(DepthPicture(blank)))
+        self.DeclareValue(DepthPicture(blank))
         # Outputs.
-        ticket = {self.abstract_state_ticket(self._picture_index)}
         self.DeclareAbstractOutputPort(
             "depth_image",
             lambda: Value(ImageDepth16U(config.width, config.height)),
             self._CalcDepthImage,
-            prerequisites_of_calc=ticket,
+            prerequisites_of_calc=self.value_tickets,
         )
-        self.DeclareVectorOutputPort(
-            "image_time", 1, self._CalcImageTime, prerequisites_of_calc=ticket
-        )
+        self.DeclareValueVector("image_time", 1, lambda now: [now.time])
         # Events.
         self.DeclarePeriodicUnrestrictedUpdateEvent(
             1.0 / rate, 0.0, self._UpdatePicture
         )
 
-    def _Picture(self, context: Context) -> DepthPicture:
-        return context.get_abstract_state(int(self._picture_index)).get_value()
-
     def _CalcDepthImage(self, context: Context, output: Value) -> None:
         image = output.get_mutable_value()
-        image.mutable_data[:, :, 0] = self._Picture(context).depth_mm
-
-    def _CalcImageTime(self, context: Context, output: BasicVector) -> None:
-        output.SetAtIndex(0, self._Picture(context).time)
+        image.mutable_data[:, :, 0] = self.GetValue(context).depth_mm
 
     def _UpdatePicture(self, context: Context, state: State) -> EventStatus:
-        last = self._Picture(context)
+        last: DepthPicture = self.GetValue(context)
         now = context.get_time()
         if self._trigger_port.HasValue(context) and self._trigger_port.Eval(context)[0]:
-            self._SetPicture(state, last.replace(spray_time=now))
-            return EventStatus.Succeeded()
+            return self.SetValue(state, last.replace(spray_time=now))
         if now < last.spray_time + MIST_TIME:
             return EventStatus.DidNothing()
         number = last.number + 1
@@ -161,9 +150,4 @@ class StereoCamera(LeafSystem):
             time=now,
             number=number,
         )
-        self._SetPicture(state, picture)
-        return EventStatus.Succeeded()
-
-    def _SetPicture(self, state: State, picture: DepthPicture) -> None:
-        index = int(self._picture_index)
-        state.get_mutable_abstract_state(index).set_value(picture)
+        return self.SetValue(state, picture)
