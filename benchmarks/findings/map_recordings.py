@@ -1,6 +1,6 @@
-"""The map accumulator on recordings: `bench_map_recordings.py [DATA]`.
+"""The mapper on recordings: `python -m benchmarks.findings.map_recordings [DATA]`.
 
-DATA, if left out `real` in the folder that the variable PAINTER_DATA names, holds
+DATA, if left out, `real` in the folder that the variable PAINTER_DATA names, holds
 `rgbd_sequence_with_poses` (7-Scenes, Kinect, KinectFusion's poses) and
 `d415_on_robot_arm` (two views of a table from an arm). The given poses are no truth: of
 the tables, the planes that the two views see are compared.
@@ -47,7 +47,7 @@ def main() -> None:
         )
     for name in TABLES:
         mapper, result = mapped(data / "d415_on_robot_arm" / name, TABLE, True)
-        before = disagreement(mapper, [k.X_arm for k in mapper.graph.keyframes])
+        before = disagreement(mapper, [k.X_WN for k in mapper.graph.keyframes])
         after = disagreement(mapper, result.solution.graph.poses)
         print(
             f"{name}: planes {before[0]:.2f} deg, {before[1]:.2f} mm apart -> "

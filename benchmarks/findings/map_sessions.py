@@ -1,10 +1,10 @@
-"""The map accumulator on rendered walls and recordings, row by row.
+"""Accuracy, memory and time of the mapper on rendered walls.
 
 `python -m benchmarks.findings.map_sessions [ROW ...] [--rate HZ] [--scans N] [--seed
-N]`; rows: textured, textured-no-arm, painted, window, blank, blank-no-arm, wrong-links,
-memory; without names all but memory. Sequences: 848 x 480 through the D435 model, 0.7 m
-from the wall, zig-zag of five rows over 2 x 2 m. CPU is of the whole process, also what
-runs on a second core.
+N]`; rows: textured, textured-no-arm, painted, window, blank, blank-no-arm,
+wrong-constraints, memory; without names all but memory. Sequences: 848 x 480 through
+the D435 model, 0.7 m from the wall, zig-zag of five rows over 2 x 2 m. CPU is of the
+whole process, on all cores.
 """
 
 import argparse
@@ -42,7 +42,7 @@ ROWS = {
     "window": (WallKind.WINDOW, ERRORS, True),
     "blank": (WallKind.BLANK, ERRORS, True),
     "blank-no-arm": (WallKind.BLANK, {}, False),
-    "wrong-links": (WallKind.TEXTURED, {}, True),
+    "wrong-constraints": (WallKind.TEXTURED, {}, True),
     "memory": (WallKind.BLANK, {}, True),
 }
 CELL = 0.01
@@ -51,7 +51,7 @@ DOUBLED = 0.008
 """A 2 cm cell is doubled, m: where truth has one surface, if two points lie so far
 apart along its normal; where truth has more (a true step crosses the cell or lies
 within STEP of it), if a point lies so far from each of them. Only the square that was
-scanned counts; beside it a point rests on three pixels."""
+scanned counts; beside it a point is the mean of three pixels."""
 SPAN = 2.0
 """Of that square, m."""
 STEP = 0.01
@@ -99,9 +99,9 @@ def run_row(row: str, rate: float, scans: int, seed: int) -> None:
             if mapper.placed and mapper.placed[-1][0] == frame.time:
                 _, k, X_KC = mapper.placed[-1]
                 online.append((frame.time, mapper.graph.poses[k] @ X_KC))
-        if row == "wrong-links":
+        if row == "wrong-constraints":
             clean = mapper.finish()
-            spoil_links(mapper, seed)
+            spoil_constraints(mapper, seed)
         result = mapper.finish()
     except NoMapError as error:
         print(f"{row}: refused: {error}")
@@ -110,12 +110,12 @@ def run_row(row: str, rate: float, scans: int, seed: int) -> None:
     report = session_report(mapper, result)
     placed, total = len(result.poses), len(truth)
     print(f"{row}: {placed} of {total} frames, {len(mapper.graph.keyframes)} keyframes")
-    if row == "wrong-links":
-        print(f"  ATE without the wrong links {ate(clean.poses, truth):.2f} mm")
+    if row == "wrong-constraints":
+        print(f"  ATE without the wrong constraints {ate(clean.poses, truth):.2f} mm")
     print(
         f"  ATE {ate(result.poses, truth):.2f} mm, as known when each frame came "
         f"{ate(online, truth):.2f} mm; arm's "
-        f"{ate(list(arm.items()), truth):.2f} mm; links {report['links']}, "
+        f"{ate(list(arm.items()), truth):.2f} mm; constraints {report['links']}, "
         f"dropped {report['links_dropped']}"
     )
     print_surface(result, wall, best_motion(result.poses, truth))
@@ -135,7 +135,7 @@ def run_row(row: str, rate: float, scans: int, seed: int) -> None:
 def scanned(
     config: SequenceConfig, scans: int, seed: int, mapper: Mapper
 ) -> Iterator[tuple[Frame, RigidTransform]]:
-    """Yields the frames of several scans; prints after each what it came to."""
+    """Yields the frames of several scans; prints the figures of each."""
     begun, last, done = 0.0, 0.0, 0
     for scan in range(scans):
         for frame, X_WC in render_sequence(config, seed + scan):
@@ -154,7 +154,7 @@ def scanned(
 
 
 def memory() -> float:
-    """Returns what the process has in memory now, MB."""
+    """Returns the process's memory now, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 1e6
 
@@ -164,15 +164,17 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
-def spoil_links(mapper: Mapper, seed: int) -> None:
-    """Moves every tenth link by 2 to 5 cm and 2 deg."""
+def spoil_constraints(mapper: Mapper, seed: int) -> None:
+    """Moves every tenth constraint by 2 to 5 cm and 2 deg."""
     rng = np.random.default_rng(seed)
-    links = list(mapper.graph.links)
-    for index in range(0, len(links), 10):
+    constraints = list(mapper.graph.constraints)
+    for index in range(0, len(constraints), 10):
         shift = rng.choice([-1, 1], 3) * rng.uniform(0.02, 0.05, 3)
         X = RigidTransform(RollPitchYaw(0.035, 0.0, -0.035), shift)
-        links[index] = links[index].replace(X_ij=links[index].X_ij @ X)
-    mapper.graph = mapper.graph.replace(links=tuple(links))
+        constraints[index] = constraints[index].replace(
+            X_ij=constraints[index].X_ij @ X
+        )
+    mapper.graph = mapper.graph.replace(constraints=tuple(constraints))
 
 
 def ate(
@@ -218,7 +220,7 @@ def print_surface(result: MappingResult, wall: WallKind, X_TW: RigidTransform) -
     Args:
         result: With the map.
         wall: Which one it is.
-        X_TW: Where the map lies; what no one can know of the mount is no doubling.
+        X_TW: Pose of the map; errors of the mount that nothing shows are no doubling.
     """
     fused = result.fused
     p_VQs = fused.X_WV.inverse() @ fused.p_WQs
@@ -238,7 +240,7 @@ def print_surface(result: MappingResult, wall: WallKind, X_TW: RigidTransform) -
     one = scanned & ~on_step(middle_T, wall)
     doubled = high - low > DOUBLED
     by_step, away = strays(X_TW @ fused.p_WQs, wall)
-    # A quadric through the wall: how far it leaves its plane over 2 m.
+    # A quadric through the wall shows how far it bends over 2 m.
     terms = np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=1)
     quadric = np.linalg.lstsq(terms, z, rcond=None)[0]
     bend = terms[:, :3] @ quadric[:3]
@@ -253,7 +255,7 @@ def print_surface(result: MappingResult, wall: WallKind, X_TW: RigidTransform) -
 
 
 def strays(p_TQs: np.ndarray, wall: WallKind) -> tuple[str, float]:
-    """Returns how many cells by true steps are doubled, and how far off a point is."""
+    """Returns the doubled cells by true steps, and the largest distance of a point."""
     cells, index = np.unique(np.floor(p_TQs[:2] / 0.02), axis=1, return_inverse=True)
     away = np.zeros(cells.shape[1])
     np.maximum.at(away, index.ravel(), distance_to_surface(p_TQs, wall))
@@ -263,7 +265,7 @@ def strays(p_TQs: np.ndarray, wall: WallKind) -> tuple[str, float]:
 
 
 def print_observed(mapper, result, truth, arm, report) -> None:
-    """Prints the camera's errors to the wall before and after, and what was moved."""
+    """Prints the camera's errors to the wall before and after, and the corrections."""
     by_arm = [arm[keyframe.time] for keyframe in mapper.graph.keyframes]
     # The best plane of the map that the arm's poses would make.
     middles = np.array(

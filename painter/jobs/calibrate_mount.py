@@ -56,7 +56,7 @@ def calibrate_mount(
     else:
         found = calibrate_on_board(posed, recording.intrinsics, board)
     report = found.report()
-    X_LC = kinematics.X_LC @ found.X_CCm
+    X_LC = kinematics.X_LC @ found.X_NC
     report["X_LC"] = X_LC.GetAsMatrix4().round(7).tolist()
     report["set"] = [
         f"wall_camera.calibrated_m={report['translation_m']}",

@@ -1,5 +1,6 @@
 """Mapping: RGB-D frames and arm poses to corrected poses and one surface map.
 
-Keyframes are linked in a pose graph, fused into a surface, and kept in sessions;
-`calibration` finds the camera mount. Rooms import in that order.
+`keyframes` holds the data kept of a frame, `pose_graph` corrects poses, `fusion` makes
+the surface, `sessions` runs them, and `calibration` finds the camera mount. Rooms
+import in that order.
 """

@@ -18,7 +18,7 @@ from perception.mapping.calibration.hand_eye import FEWEST, CalibrationError, Ha
 _DICTIONARY = cv2.aruco.DICT_5X5_100
 _FEWEST_CORNERS = 6
 _HUBER = 2.0
-"""Corners farther off than this count less, px."""
+"""Corners with larger residuals get less weight, px."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class BoardConfig:
         return cv2.aruco.CharucoBoard(size, self.square, self.marker, dictionary)
 
     def draw(self, pixels_per_m: float) -> npt.NDArray[np.uint8]:
-        """Draws the board without a margin, grey levels, to be printed."""
+        """Draws the board for printing, grey levels, without a margin."""
         width = round(self.columns * self.square * pixels_per_m)
         height = round(self.rows * self.square * pixels_per_m)
         return np.asarray(self.board().generateImage((width, height))).astype(np.uint8)
@@ -67,7 +67,7 @@ def find_corners(color: ColorImage, config: BoardConfig) -> tuple[IntArray, Floa
     """Finds the board's corners in a picture.
 
     Returns:
-        Numbers of the corners (n,) and where they are (n, 2), px.
+        Numbers (n,) and positions (n, 2), px, of the corners.
     """
     grey = cv2.cvtColor(color, cv2.COLOR_RGB2GRAY)
     corners, numbers, _, _ = cv2.aruco.CharucoDetector(config.board()).detectBoard(grey)
@@ -80,14 +80,14 @@ def find_corners(color: ColorImage, config: BoardConfig) -> tuple[IntArray, Floa
 def calibrate_on_board(
     frames: Sequence[Frame], intrinsics: CameraIntrinsics, config: BoardConfig
 ) -> HandEye:
-    """Finds the mount and the board's place that put its corners where they are seen.
+    """Finds the mount and the board's pose by least squares of reprojection errors.
 
-    Source: the reprojection error over all pictures, as in Strobl and Hirzinger,
-    "Optimal hand-eye calibration", 2006; standard deviations by White, 1980, each
-    picture a cluster, since the arm's error is the same for all of its corners.
+    Source: Strobl and Hirzinger, "Optimal hand-eye calibration", 2006; standard
+    deviations by White, 1980, each picture a cluster, since the arm's error is the same
+    for all of its corners.
 
     Args:
-        frames: Pictures with the poses of the arm's model, X_WC; depth is not used.
+        frames: Pictures with the nominal poses of the arm's model; depth is not used.
         intrinsics: Of the colour pictures, without distortion.
         config: The board.
 
@@ -103,7 +103,7 @@ def calibrate_on_board(
             views.append((frame.X_WC, numbers, uv))
     if len(views) < FEWEST:
         raise CalibrationError(
-            f"{len(views)} pictures show the board and have a pose of the arm, "
+            f"{len(views)} pictures show the board and have a pose by the arm, "
             f"{FEWEST} are needed.",
             code="PNT-CALIBRATE-001",
         )
@@ -113,10 +113,10 @@ def calibrate_on_board(
     owner = np.repeat(np.arange(len(views)), [2 * len(view[1]) for view in views])
 
     def residuals(x: FloatArray) -> FloatArray:
-        X_CCm, X_WB = _pose(x[:6]), _pose(x[6:])
+        X_NC, X_WB = _pose(x[:6]), _pose(x[6:])
         parts = []
         for X_WC, numbers, uv in views:
-            p_CQs = (X_WC @ X_CCm).inverse() @ X_WB @ p_BQs[numbers].T
+            p_CQs = (X_WC @ X_NC).inverse() @ X_WB @ p_BQs[numbers].T
             parts.append((intrinsics.project(p_CQs).T - uv).ravel())
         return np.concatenate(parts)
 
@@ -128,7 +128,7 @@ def calibrate_on_board(
     clusters = np.stack([scores[owner == k].sum(axis=0) for k in range(len(views))])
     covariance = inverse @ clusters.T @ clusters @ inverse
     return HandEye(
-        X_CCm=_pose(answer.x[:6]),
+        X_NC=_pose(answer.x[:6]),
         sigma=np.sqrt(np.diag(covariance)[:6]),
         observed=np.ones(6),
         pictures=len(views),

@@ -1,7 +1,7 @@
-"""Hand-eye calibration: where the camera really sits on the arm.
+"""Hand-eye calibration: the pose of the camera on the arm.
 
-From pictures of a wall, best with a box on it, taken with the wrist turned many ways:
-the pose graph's mount, with a wide prior.
+Uses pictures of a wall, best with a box on it, taken in many orientations of the wrist:
+the mount of the pose graph, with a wide prior.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from perception.mapping.pose_graph.keyframe_graph import KeyframeGraph
 from perception.mapping.pose_graph.observability import information_of
 
 FEWEST = 8
-"""Pictures that a calibration takes at least."""
+"""Fewest pictures of a calibration."""
 CONFIG = MapperConfig(
     arm_sigma=0.0003,
     arm_sigma_deg=0.02,
@@ -31,15 +31,15 @@ CONFIG = MapperConfig(
     base_sigma_deg=1e-4,
     max_links=4,
 )
-"""The base stands still and the arm is good; the mount is made to some mm and deg, and
-where the pictures do not halve that it stays as it is: errors that they share, as the
-sensor's ripple, are then as large."""
+"""The base stands still and the arm is good; the mount is made to some mm and deg.
+Where the pictures do not halve that it stays nominal: errors that they share, such as
+the sensor's ripple, are then as large."""
 _ROUNDS = 3
-"""Links and planes are looked for again with the mount that was found."""
+"""Registrations, each with the mount found before."""
 
 
 class CalibrationError(PerceptionError):
-    """The pictures do not tell where the camera is; the message says why."""
+    """The pictures do not determine the mount; the message gives the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +47,17 @@ class HandEye(FrozenValue):
     """A calibrated mount.
 
     Attributes:
-        X_CCm: The true camera frame, seen from where the arm's model has it.
+        X_NC: Pose of the camera in the nominal camera frame of the arm's model.
         sigma: (6,) standard deviations of its rotation vector, rad, and translation, m;
             the prior's where it is not observed.
-        observed: (6,) share of each that the pictures determine, 0 to 1; what they do
-            not is left at zero.
-        pictures: Used.
-        residual: Root mean square distance of what is left, m (a wall's planes) or px
-            (a board's corners).
+        observed: (6,) share of each that the pictures determine, 0 to 1; the rest is
+            left at zero.
+        pictures: Number used.
+        residual: Root mean square residual, m (planes of a wall) or px (corners of a
+            board).
     """
 
-    X_CCm: RigidTransform
+    X_NC: RigidTransform
     sigma: FloatArray
     observed: FloatArray
     pictures: int
@@ -65,11 +65,11 @@ class HandEye(FrozenValue):
 
     def report(self) -> dict[str, Any]:
         """Returns the figures as JSON values, deg and m."""
-        turn = RollPitchYaw(self.X_CCm.rotation()).vector()
+        turn = RollPitchYaw(self.X_NC.rotation()).vector()
         return {
             "pictures": self.pictures,
             "rotation_deg": np.degrees(turn).round(5).tolist(),
-            "translation_m": self.X_CCm.translation().round(7).tolist(),
+            "translation_m": self.X_NC.translation().round(7).tolist(),
             "rotation_sigma_deg": np.degrees(self.sigma[:3]).round(5).tolist(),
             "translation_sigma_m": self.sigma[3:].round(7).tolist(),
             "observed": self.observed.round(3).tolist(),
@@ -82,10 +82,10 @@ def calibrate_on_wall(
     intrinsics: CameraIntrinsics,
     config: MapperConfig = CONFIG,
 ) -> HandEye:
-    """Finds the mount from what stands still before the camera.
+    """Finds the mount from pictures of a scene that does not move.
 
     Args:
-        frames: Pictures with the poses of the arm's model, X_WC.
+        frames: Pictures with the nominal poses of the arm's model.
         intrinsics: Of the camera.
         config: Sigmas and thresholds.
 
@@ -95,7 +95,7 @@ def calibrate_on_wall(
     usable = [frame for frame in frames if frame.X_WC is not None]
     if len(usable) < FEWEST:
         raise CalibrationError(
-            f"{len(usable)} pictures have a pose of the arm, {FEWEST} are needed.",
+            f"{len(usable)} pictures have a pose by the arm, {FEWEST} are needed.",
             code="PNT-CALIBRATE-002",
         )
     keyframes = [
@@ -106,15 +106,15 @@ def calibrate_on_wall(
     ]
     if sum(bool(keyframe.planes) for keyframe in keyframes) < FEWEST:
         raise CalibrationError(
-            f"fewer than {FEWEST} pictures show a plane: look at a wall.",
+            f"fewer than {FEWEST} pictures show a plane: point the camera at a wall.",
             code="PNT-CALIBRATE-003",
         )
     mount = RigidTransform()
     for _ in range(_ROUNDS):
         graph = KeyframeGraph.empty(intrinsics, config)
         for keyframe in keyframes:
-            assert keyframe.X_arm is not None  # `usable` has no others.
-            graph = graph.extended(keyframe, keyframe.X_arm @ mount)
+            assert keyframe.X_WN is not None  # `usable` has no others.
+            graph = graph.extended(keyframe, keyframe.X_WN @ mount)
         solution = graph.solved()
         mount = solution.mount
     estimate = solution.estimate
@@ -128,7 +128,7 @@ def calibrate_on_wall(
     prior = np.diag(information_of(config.mount_sigma, config.mount_sigma_deg)) ** -0.5
     found = np.sqrt(np.diag(estimate.mount_covariance))
     return HandEye(
-        X_CCm=mount,
+        X_NC=mount,
         sigma=np.where(observed > 0.5, found, prior),
         observed=observed,
         pictures=len(keyframes),

@@ -1,4 +1,4 @@
 """Fusion of depth pictures into one surface.
 
-Takes poses as given; who corrects them is `pose_graph`.
+Takes poses as given; `pose_graph` corrects them.
 """

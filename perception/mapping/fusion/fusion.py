@@ -1,4 +1,4 @@
-"""Fuses keyframes into one surface: weighted, counted, and cleared of ghosts."""
+"""Fuses keyframes into one surface, weighted and counted, without outliers."""
 
 import itertools
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ _REACH = 1 << 20
 _BATCH = 8
 """Keyframes whose voxels are added to the map at once."""
 _MIN_COUNT = 3
-_GHOST_SHARE = 0.2
-"""Voxels with less than this share of the best one beside them are no surface."""
+_OUTLIER_SHARE = 0.2
+"""Voxels with less than this share of the best voxel around them are outliers."""
 _SEEN_THROUGH = 0.02
-"""A point is seen through by depth that lies so much farther, m and share of it."""
+"""Depth farther than a point by this, m plus share of range, sees through it."""
 _CARVERS = 3
-"""Every so many-th keyframe looks for what it sees through; neighbours see the same."""
+"""Every so many-th keyframe carves; neighbours see the same."""
 _UNKNOWN_COS = 0.3
 """Cosine of incidence where the grid has no normal."""
 _GOOD_RANGE = 0.7
@@ -45,7 +45,7 @@ class FusedMap(FrozenValue):
         frames: (N,) int64, keyframes that saw it.
         variances: (N,) m², along the main plane's normal.
         X_WV: Frame of the voxels: z is the main plane's normal.
-        carved: Points left out because later frames see through them.
+        carved: Points removed because more keyframes see through them than see them.
     """
 
     p_WQs: FloatArray
@@ -67,11 +67,11 @@ def fuse(
 ) -> FusedMap:
     """Fuses all keyframes at their poses.
 
-    A pixel weighs as the inverse variance of its depth, which grows as the fourth power
-    of range, times the squared cosine of its incidence.
+    The weight of a pixel is the inverse variance of its depth, which grows with the
+    fourth power of range, times the squared cosine of incidence.
 
     Args:
-        keyframes: What to fuse.
+        keyframes: With their pictures.
         poses: X_WC of each.
         X_WV: Frame whose z is the main surface's normal, towards the cameras.
         intrinsics: Of the camera.
@@ -118,8 +118,9 @@ def write_map(path: Path, fused: FusedMap) -> None:
 def write_voxels(path: Path, fused: FusedMap, edge: float) -> int:
     """Writes the cubes that hold points: NPZ with `index`, `count`, `edge` and `X_WV`.
 
-    Cube (i, j, k) of `index` (n, 3) int32 reaches from `edge` (i, j, k) in V on; its
-    `count` (n,) is of pixels. V is the map's own frame, z out of the main surface.
+    Row (i, j, k) of `index` (n, 3) int32 is the cube whose lowest corner in V is
+    `edge` * (i, j, k); `count` (n,) is its number of pixels. V is the map's own frame,
+    z out of the main surface.
 
     Args:
         path: The file.
@@ -127,7 +128,7 @@ def write_voxels(path: Path, fused: FusedMap, edge: float) -> int:
         edge: Of a cube, m.
 
     Returns:
-        How many there are.
+        The number of cubes.
     """
     p_VQs = fused.X_WV.inverse() @ fused.p_WQs if fused.p_WQs.size else fused.p_WQs
     cells = np.floor(p_VQs / edge).astype(np.int32)
@@ -144,7 +145,7 @@ def write_mesh(path: Path, fused: FusedMap, depth: int = 9) -> int:
     Source: Kazhdan and Hoppe, "Screened Poisson surface reconstruction", 2013.
 
     Returns:
-        Its triangles.
+        The number of triangles.
     """
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(fused.p_WQs.T.copy()))
     cloud.normals = o3d.utility.Vector3dVector(fused.normals_W.T.copy())
@@ -229,11 +230,7 @@ def _join_layers(
 
 
 def _real(keys: IntArray, sums: FloatArray) -> BoolArray:
-    """Finds voxels with enough pixels and frames, as in `VoxelMap.surface_map`.
-
-    Enough is a share of what the best voxel of the 3 x 3 columns round it got: a flying
-    pixel is not seen again when the camera has moved, a surface is.
-    """
+    """Finds voxels with enough pixels and frames; see `VoxelMap.surface_map`."""
     if not keys.size:
         return np.zeros(0, dtype=np.bool_)
     columns, index = np.unique(keys // (2 * _REACH), return_inverse=True)
@@ -246,7 +243,7 @@ def _real(keys: IntArray, sums: FloatArray) -> BoolArray:
             beside = columns + i * 2 * _REACH + j
             place = np.minimum(np.searchsorted(columns, beside), columns.size - 1)
             best = np.maximum(best, np.where(columns[place] == beside, own[place], 0.0))
-        real &= sums[row] >= _GHOST_SHARE * best[index]
+        real &= sums[row] >= _OUTLIER_SHARE * best[index]
     return np.asarray(real)
 
 

@@ -1,4 +1,4 @@
-"""Voxel map of a wall: fuses points pixel by pixel and gives out one surface."""
+"""Voxel map of a wall: fuses points into voxels and returns one surface."""
 
 import dataclasses
 import functools
@@ -26,20 +26,20 @@ class VoxelMap(FrozenValue):
     """Sums over the points in each voxel, sorted by voxel.
 
     Voxels are square in the plane of the expected wall and `config.layer` high along
-    its normal, the wall lying in the middle of a layer: a surface that is spread by a
-    few mm of depth noise fills one voxel a column and not a thick slab of small ones.
+    its normal, with the wall in the middle of a layer. A surface with a few mm of
+    depth noise then fills one voxel per column instead of a slab of small ones.
 
     Attributes:
         X_WV: Grid frame V in W: the expected wall's tile frame.
         width: Of the tile, along V x, m.
         height: Of the tile, along V y, m.
         config: Sizes and thresholds; never changed.
-        keys: (N,) int64, sorted, one a voxel; see `_keys`.
+        keys: (N,) int64, ascending, one per voxel; see `_keys`.
         counts: (N,) int64, points fused.
-        frames: (N,) int64, pictures that had such a point.
+        frames: (N,) int64, pictures that had a point in the voxel.
         sums: (4, N) float64, m and m²: sums of x, y, z and z² of the points in V.
-        camera_sums: (3, N) float32, m: sum over `frames` of the camera's origin in V.
-        p_WCs: (3, n) float64, m, in W: where the n pictures fused so far were taken.
+        camera_sums: (3, N) float32, m: sum over `frames` of the camera centres in V.
+        p_WCs: (3, n) float64, m, in W: camera centres of the n pictures fused.
     """
 
     X_WV: RigidTransform
@@ -57,7 +57,7 @@ class VoxelMap(FrozenValue):
     def empty(
         cls, X_WV: RigidTransform, width: float, height: float, config: MapConfig
     ) -> Self:
-        """Makes a map of nothing round a tile.
+        """Makes an empty map around a tile.
 
         Args:
             X_WV: Tile frame of the expected wall in W.
@@ -92,7 +92,7 @@ class VoxelMap(FrozenValue):
 
         Args:
             p_WQs: (3, N) float64, m, in W; those outside the tile and its margins are
-                left out.
+                dropped.
             p_WC: (3,) m, origin of the camera in W.
 
         Returns:
@@ -130,12 +130,12 @@ class VoxelMap(FrozenValue):
 
     @functools.cached_property
     def surface_map(self) -> SurfaceMap:
-        """Surface points: one a voxel, ghosts left out, sorted by voxel.
+        """Surface points, one per voxel, in the order of voxels, without outliers.
 
-        An outlier is a voxel with fewer than `config.min_count` points, or with less
-        than `config.outlier_share` of the points or of the pictures that the best voxel
-        of the 3 x 3 columns round it got: a flying pixel or a match gone wrong is not
-        seen again when the camera has moved, a surface is.
+        A voxel is an outlier if it has fewer than `config.min_count` points, or less
+        than `config.outlier_share` of the points or pictures of the best voxel in the
+        3 x 3 columns around it. A flying pixel or a false match does not reappear when
+        the camera moves; a surface does.
         """
         keys, counts, frames, sums, camera_sums = self._join_layers()
         column = keys // self._shape[2]
@@ -173,7 +173,7 @@ class VoxelMap(FrozenValue):
         """Numbers the voxels: layer by layer up a column, column by column.
 
         Returns:
-            Voxel numbers of the points that lie in the box, and which points they are.
+            Keys of the points in the box, and the indices of these points.
         """
         config = self.config
         nx, ny, nz = self._shape
@@ -189,10 +189,10 @@ class VoxelMap(FrozenValue):
     def _join_layers(
         self,
     ) -> tuple[IntArray, IntArray, IntArray, FloatArray, npt.NDArray[np.float32]]:
-        """Joins voxels on top of each other that share one surface.
+        """Joins stacked voxels that hold one surface.
 
-        A surface at the border of two layers fills both. Their mean points are then
-        much closer than the layers; half a layer tells them from a true step.
+        A surface on the border of two layers fills both. Their means are then much
+        closer than the layers; half a layer separates them from a true step.
 
         Returns:
             Keys (of the lower voxel), counts, frames, sums and camera sums.
@@ -215,7 +215,7 @@ class VoxelMap(FrozenValue):
         )
 
     def _best_around(self, column: IntArray, values: IntArray) -> IntArray:
-        """Returns the largest value in the 3 x 3 columns round each voxel's."""
+        """Returns the largest value in the 3 x 3 columns around each voxel."""
         nx, ny, _ = self._shape
         best = np.zeros(nx * ny, dtype=np.int64)
         np.maximum.at(best, column, values)
@@ -225,7 +225,7 @@ class VoxelMap(FrozenValue):
 def _normals(
     p_WQs: FloatArray, p_WCs: FloatArray, radius: float
 ) -> npt.NDArray[np.float32]:
-    """Fits planes to the neighbours of each point; normals point to the cameras."""
+    """Fits a plane to the neighbours of each point; normals face the cameras."""
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p_WQs.T))
     cloud.estimate_normals(
         o3d.geometry.KDTreeSearchParamHybrid(radius=radius, max_nn=_NORMAL_NEIGHBORS)

@@ -1,4 +1,4 @@
-"""Keyframes: what is kept of a frame, and which of them are in memory.
+"""Keyframes: the data kept of a frame, and which of it is in memory.
 
-No links and no optimisation; those are in `pose_graph`.
+Constraints and optimisation are in `pose_graph`.
 """

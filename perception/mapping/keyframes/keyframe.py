@@ -1,4 +1,4 @@
-"""What is taken from one frame: a grid of oriented points, planes and features."""
+"""Data of one frame: a grid of oriented points, planes and features."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -17,15 +17,15 @@ from perception.mapping.keyframes.view import Features, ThinPicture, View
 from perception.paper_steps.planes import fit_plane, ransac_plane
 
 BLOCK = 8
-"""Pixels of a grid point's edge: the noise of its mean is a third of a pixel's."""
+"""Edge of a block, px: the noise of its mean depth is a third of a pixel's."""
 _SAMPLED = 16
-"""Every so many-th block stands for all where two views are compared."""
+"""Every so many-th block is compared between two views."""
 _FILLED = 0.75
-"""Share of a block's pixels that must be usable."""
+"""Least share of usable pixels of a block."""
 _STEP = 0.02
-"""Neighbours in the grid farther apart than this share of depth share no surface."""
+"""Neighbouring grid points farther apart than this share of depth are a step."""
 _NOISE_RANGE = 0.7
-"""Range at which `MapperConfig.plane_threshold` holds, m; noise grows as its square."""
+"""Range of `MapperConfig.plane_threshold`, m; noise grows with its square."""
 _MOST_PLANES = 3
 
 
@@ -66,7 +66,7 @@ class PointGrid(FrozenValue):
 
 
 class ViewSource(Protocol):
-    """Has a view in memory, or knows where it is."""
+    """Holds a view in memory or reads it back."""
 
     def view(self) -> View:
         """Returns the view."""
@@ -74,20 +74,20 @@ class ViewSource(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Keyframe(FrozenValue):
-    """What is kept of a frame; full pictures are not.
+    """The data kept of a frame, without its full pictures.
 
     Attributes:
         number: Of the frame, counted from 0.
         time: s.
-        X_arm: Pose that the arm gave; None = unknown.
+        X_WN: Pose of the nominal camera by the arm; None = unknown.
         planes: Largest first.
         sample: (3, n) float32, m, in C, some of its mean points; see `sample_of`.
-        source: Of all that takes memory.
+        source: Of the view, which takes most memory.
     """
 
     number: int
     time: float
-    X_arm: RigidTransform | None
+    X_WN: RigidTransform | None
     planes: tuple[PlaneSight, ...]
     sample: npt.NDArray[np.float32]
     source: ViewSource
@@ -104,11 +104,11 @@ class Keyframe(FrozenValue):
 
     @property
     def picture(self) -> ThinPicture | None:
-        """Pixels for the fusion; None where others keep them."""
+        """Pixels for the fusion; None = kept elsewhere."""
         return self.source.view().picture
 
     def grid(self, intrinsics: CameraIntrinsics) -> PointGrid:
-        """Returns its mean points with their normals."""
+        """Returns its mean points with normals."""
         return grid_of(self.z, intrinsics)
 
 
@@ -119,7 +119,7 @@ def make_keyframe(
     intrinsics: CameraIntrinsics,
     config: MapperConfig,
 ) -> Keyframe:
-    """Takes from a frame what the mapper keeps of it.
+    """Makes a keyframe of a frame.
 
     Args:
         frame: The frame.
@@ -134,7 +134,7 @@ def make_keyframe(
     return Keyframe(
         number=number,
         time=frame.time,
-        X_arm=frame.X_WC,
+        X_WN=frame.X_WC,
         planes=tuple(see_planes(grid_of(z, intrinsics), config, number)),
         sample=sample_of(z, intrinsics),
         source=View(z, features, picture),
@@ -146,7 +146,7 @@ def mean_depth(depth_mm: DepthImage, usable: BoolArray) -> npt.NDArray[np.float3
 
     Args:
         depth_mm: (H, W) uint16, mm, 0 = no return.
-        usable: (H, W) bool, pixels to take.
+        usable: (H, W) bool, pixels to average.
 
     Returns:
         (H // BLOCK, W // BLOCK) float32, m; 0 where too few pixels are usable.
@@ -252,7 +252,7 @@ def _sight(points: FloatArray, share: float, config: PoseGraphConfig) -> PlaneSi
     normal = plane.normal * (-1.0 if plane.normal @ center > 0 else 1.0)
     axes = np.linalg.svd(normal[None])[2][1:].T
     spread = np.std(axes.T @ (points - center[:, None]), axis=1)
-    # Noise of neighbouring blocks is correlated: a quarter of them are independent.
+    # Noise of neighbouring blocks is correlated: a quarter count as independent.
     noise = plane.rms / np.sqrt(points.shape[1] / 4.0)
     return PlaneSight(
         center=center,

@@ -1,4 +1,4 @@
-"""What fills memory of a keyframe: mean depths, corners, thinned pixels."""
+"""The large data of a keyframe: mean depths, corners, thinned pixels."""
 
 import io
 import zlib
@@ -64,7 +64,7 @@ class ThinPicture(FrozenValue):
             depth_mm: (H, W) uint16, mm.
             usable: (H, W) bool, the pixels whose depth is kept.
             stride: Every so many-th pixel and row is kept.
-            color: (H, W, 3) uint8, RGB, if that is wanted, too.
+            color: (H, W, 3) uint8, RGB; None = not kept.
         """
         thin = np.s_[::stride, ::stride]
         kept = np.where(usable[thin], depth_mm[thin], np.uint16(0))
@@ -76,10 +76,10 @@ class ThinPicture(FrozenValue):
         return cls(stride, shape, zlib.compress(kept.tobytes(), 1), jpeg)
 
     def camera(self, intrinsics: CameraIntrinsics) -> CameraIntrinsics:
-        """Returns the camera that would have taken the thinned picture.
+        """Returns the intrinsics of the thinned picture.
 
         Args:
-            intrinsics: Of the one that took the full picture.
+            intrinsics: Of the full picture.
         """
         return CameraIntrinsics(
             fx=intrinsics.fx / self.stride,
@@ -97,7 +97,7 @@ class ThinPicture(FrozenValue):
 
     @property
     def colors(self) -> ColorImage:
-        """Unpacks (h, w, 3) uint8, RGB; black where no colours were kept."""
+        """Unpacks (h, w, 3) uint8, RGB; black if none were kept."""
         if self.color is None:
             return np.zeros((*self.shape, 3), np.uint8)
         image = cv2.imdecode(np.frombuffer(self.color, np.uint8), cv2.IMREAD_COLOR)
@@ -106,12 +106,12 @@ class ThinPicture(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class View(FrozenValue):
-    """What a keyframe saw.
+    """The large data of a keyframe.
 
     Attributes:
         z: (h, w) float32, m, mean depth of blocks of pixels, 0 = none.
         features: Corners.
-        picture: Pixels for the fusion; None where others keep them.
+        picture: Pixels for the fusion; None = kept elsewhere.
     """
 
     z: npt.NDArray[np.float32]
@@ -119,11 +119,11 @@ class View(FrozenValue):
     picture: ThinPicture | None = None
 
     def view(self) -> Self:
-        """Returns itself: it is in memory."""
+        """Returns itself."""
         return self
 
     def packed(self) -> bytes:
-        """Returns it as the bytes of an NPZ file."""
+        """Returns the view as bytes of an NPZ file."""
         arrays: dict[str, npt.ArrayLike] = {"z": self.z, **vars(self.features)}
         if self.picture is not None:
             arrays["stride"] = self.picture.stride
@@ -137,7 +137,7 @@ class View(FrozenValue):
 
     @classmethod
     def unpacked(cls, data: bytes) -> Self:
-        """Returns the view that `packed` made bytes of."""
+        """Returns the view from the bytes of `packed`."""
         with np.load(io.BytesIO(data)) as arrays:
             picture = None
             if "depth" in arrays:

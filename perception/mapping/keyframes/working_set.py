@@ -1,4 +1,4 @@
-"""The keyframes that are in memory and solved for; the others wait in a file."""
+"""The keyframes in memory; the others are in a file."""
 
 import sqlite3
 import weakref
@@ -11,27 +11,27 @@ from perception.mapping.keyframes.view import View
 
 
 class WorkingSet:
-    """Keeps the views of the keyframes that were used last, at most so many.
+    """Keeps the most recently used views in memory, up to a limit.
 
-    Every view is written to a temporary SQLite file when it is taken, and read back
-    when it is used again after it had to leave. The file is nameless and goes with the
-    process: it can be made again from the raw pictures that a `MapStore` keeps.
+    Every view is written to a temporary SQLite file when it is added, and read back
+    when it is used after it left memory. The file has no name and ends with the
+    process; it can be made again from the raw pictures in a `MapStore`.
     """
 
     def __init__(self, size: int) -> None:
-        """Starts with none.
+        """Starts an empty set.
 
         Args:
-            size: Views in memory, at most.
+            size: Largest number of views in memory.
 
         Raises:
             ValueError: `size` is not positive.
         """
         if size < 1:
-            raise ValueError(f"a working set holds >= 1 keyframe, got {size!r}.")
+            raise ValueError(f"mapping.working_set must be >= 1, got {size!r}.")
         self._size = size
         self._views: OrderedDict[int, View] = OrderedDict()
-        # An empty name is a file that SQLite removes; two MB of it are in memory.
+        # An empty name is a temporary file; SQLite caches 2 MB of it in memory.
         self._db = sqlite3.connect("", isolation_level=None)
         weakref.finalize(self, self._db.close)
         self._db.execute("CREATE TABLE views (k INTEGER PRIMARY KEY, data BLOB)")
@@ -42,14 +42,14 @@ class WorkingSet:
         return sorted(self._views)
 
     def take(self, k: int, keyframe: Keyframe) -> Keyframe:
-        """Takes a keyframe's view.
+        """Adds a keyframe's view.
 
         Args:
             k: Its number, a new one.
             keyframe: With its view in memory.
 
         Returns:
-            The keyframe, whose view is in memory or in the file.
+            The keyframe, its view in memory or in the file.
         """
         view = keyframe.source.view()
         self._db.execute("INSERT INTO views VALUES (?, ?)", (k, view.packed()))
@@ -57,7 +57,7 @@ class WorkingSet:
         return keyframe.replace(source=_Paged(k, self))
 
     def view(self, k: int) -> View:
-        """Returns a keyframe's view; it is a member from now on."""
+        """Returns a keyframe's view and makes it the most recently used."""
         view = self._views.get(k)
         if view is None:
             row = self._db.execute("SELECT data FROM views WHERE k = ?", (k,))
@@ -74,7 +74,7 @@ class WorkingSet:
 
 @dataclass(frozen=True, eq=False)
 class _Paged(FrozenValue):
-    """The view of keyframe `k`, wherever it is."""
+    """The view of keyframe `k`, in memory or in the file."""
 
     k: int
     working_set: WorkingSet

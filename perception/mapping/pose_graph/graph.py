@@ -1,9 +1,9 @@
 """The pose graph: keyframes, plane landmarks, the mount's error and the base's shift.
 
 Minimises over all at once, by Gauss-Newton on a sparse system with graduated robust
-weights. Open3D's pose graph holds relative poses only, and would take the arm's
-absolute poses for links to a fixed node, without planes and slow states; GTSAM is no
-dependency. So the sum of squares is our own and SciPy solves it.
+weights. Open3D's pose graph holds relative poses only: the arm's absolute poses
+would become constraints to a fixed node, and it has no planes and slow states. GTSAM is
+no dependency. So the sum of squares is our own and SciPy solves it.
 
 Source: Yang et al., "Graduated non-convexity for robust spatial perception", 2020;
 Black and Rangarajan, "On the unification of line processes", 1996 (Geman-McClure).
@@ -18,21 +18,21 @@ import numpy as np
 from perception.ground import BoolArray, FloatArray, IntArray
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframes.keyframe import PlaneSight
-from perception.mapping.pose_graph.links import PoseConstraint
+from perception.mapping.pose_graph.constraints import PoseConstraint
 from perception.mapping.pose_graph.normal_equations import NormalEquations
 from perception.mapping.pose_graph.observability import information_of
 from perception.mapping.pose_graph.poses import Poses, skew
 
 _SCHEDULE = (1e5, 1e4, 1e3, 100.0, 30.0, 30.0, 30.0)
-"""Squared sigmas at which a link's weight has fallen to a quarter, round by round."""
+"""Squared sigmas at which the weight of a constraint is a quarter, round by round."""
 _QUICK = (1e3, 100.0, 30.0)
-"""The same between keyframes, when the last answer is near."""
+"""The same between keyframes, when the last estimate is near."""
 _LOOSE = 500.0
-"""Rounds above this let the base walk ten times as far."""
+"""Above this scale the base's steps have ten times the standard deviation."""
 _WALK = 4.0
 """The same for steps of the base, which are rare and large (Cauchy's weights)."""
 _HALVED = 0.25
-"""Of a variance whose standard deviation was halved."""
+"""Factor of the variance when the standard deviation is halved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,13 @@ class Sighting:
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """What is held while only some keyframes are solved for.
+    """What is held fixed while only some keyframes are solved for.
 
     Attributes:
-        keyframes: (n,) bool, those that are held, with the base's steps at them.
-        planes: (m,) bool, those that are held.
-        mount: (6,) step from the arm's camera frame to the true one, held as well.
-        base: (n) steps of the base in W, about its origin: where they are held, or else
-            thought to be.
+        keyframes: (n,) bool, keyframes held fixed, with the base's steps at them.
+        planes: (m,) bool, planes held fixed.
+        mount: (6,) step from the nominal camera frame N to C, held fixed.
+        base: (n) steps of the base in W, about its origin: fixed or first guess.
     """
 
     keyframes: BoolArray
@@ -64,23 +63,23 @@ class Settled:
 
 @dataclass(eq=False)
 class Problem:
-    """What is known of the keyframes.
+    """Measurements and first guesses of the keyframes.
 
     Attributes:
-        X_WC: Where they are thought to be.
-        X_arm: (n) poses that the arm gives; rows without one are any pose.
-        has_arm: (n,) bool.
-        links: Between keyframes.
-        sightings: Of planes.
+        X_WC: (n) first guesses.
+        X_WN: (n) poses of the nominal camera by the arm; arbitrary without one.
+        has_arm: (n,) bool, the arm gave a pose.
+        constraints: Between keyframes.
+        sightings: Planes seen by keyframes.
         planes: (m, 4): unit normal in W and offset, n . p = d.
-        numbers: (n,) ascending, by which links and sightings call the keyframes.
-        settled: What is held; None = nothing but the base's step at the first keyframe.
+        numbers: (n,) ascending, keyframe numbers in constraints and sightings.
+        settled: What is held fixed; None = only the base's step at the first keyframe.
     """
 
     X_WC: Poses
-    X_arm: Poses
+    X_WN: Poses
     has_arm: BoolArray
-    links: list[PoseConstraint]
+    constraints: list[PoseConstraint]
     sightings: list[Sighting]
     planes: FloatArray
     numbers: IntArray
@@ -94,15 +93,15 @@ class Estimate:
     Attributes:
         X_WC: Poses of the keyframes.
         planes: (m, 4), as in `Problem`.
-        mount: (6,) step from the arm's camera frame to the true one.
+        mount: (6,) step from the nominal camera frame N to C.
         mount_covariance: (6, 6) of it, rad and m squared.
-        mount_observed: (6, 6) projection on its observed directions, in units of its
+        mount_observed: (6, 6) projection onto its observed directions, in units of its
             prior; along the others it is held at zero.
-        base: (n) steps of the base in W at every keyframe, about the scan's middle.
-        middle: (3,) m, in W, that middle.
-        link_weights: (links,) 0 = dropped, 1 = taken in full.
+        base: (n) steps of the base in W at every keyframe, about `middle`.
+        middle: (3,) m, in W, middle of the scan.
+        constraint_weights: (constraints,) 0 = dropped, 1 = full weight.
         sight_weights: (sightings,) the same.
-        observed: (n, 6, 6) what links and planes tell of each keyframe.
+        observed: (n, 6, 6) information on each keyframe from constraints and planes.
     """
 
     X_WC: Poses
@@ -112,29 +111,31 @@ class Estimate:
     mount_observed: FloatArray
     base: Poses
     middle: FloatArray
-    link_weights: FloatArray
+    constraint_weights: FloatArray
     sight_weights: FloatArray
     observed: FloatArray = field(repr=False)
 
 
 class Graph:
-    """Optimises one `Problem`; makes its arrays once."""
+    """Optimises one `Problem`."""
 
     def __init__(self, problem: Problem, config: PoseGraphConfig) -> None:
-        """Lays the problem out in arrays.
+        """Puts the problem into arrays.
 
         Args:
-            problem: Keyframes, links and sightings; not changed.
+            problem: Keyframes, constraints and sightings; not changed.
             config: Sigmas and thresholds.
         """
         self._problem, self._config = problem, config
         self._n, self._m = len(problem.X_WC), len(problem.planes)
-        links, sights = problem.links, problem.sightings
+        constraints, sights = problem.constraints, problem.sightings
         numbers = problem.numbers
-        self._i = np.searchsorted(numbers, [link.i for link in links])
-        self._j = np.searchsorted(numbers, [link.j for link in links])
-        self._Z = Poses.of([link.X_ij for link in links])
-        self._omega = np.array([link.information for link in links]).reshape(-1, 6, 6)
+        self._i = np.searchsorted(numbers, [constraint.i for constraint in constraints])
+        self._j = np.searchsorted(numbers, [constraint.j for constraint in constraints])
+        self._Z = Poses.of([constraint.X_ij for constraint in constraints])
+        self._omega = np.array(
+            [constraint.information for constraint in constraints]
+        ).reshape(-1, 6, 6)
         self._k = np.searchsorted(numbers, [s.k for s in sights])
         self._l = np.array([s.plane for s in sights], dtype=np.int64)
         self._center = np.array([s.sight.center for s in sights]).reshape(-1, 3)
@@ -155,7 +156,7 @@ class Graph:
                 [np.repeat(free, 6), np.repeat(~settled.planes, 3)]
             )
         self._arm = np.flatnonzero(problem.has_arm & ~held)
-        # The base's steps count from the first keyframe on; without an arm, all does.
+        # The first keyframe is the base's reference, and without an arm that of all.
         self._free[6 * self._n : 6 * self._n + 6] = False
         if not len(self._arm):
             self._free[:6] = False
@@ -164,13 +165,13 @@ class Graph:
         """Finds the most likely poses, with the mount's error where it is observed.
 
         A second pass holds the mount at zero along directions whose standard deviation
-        the frames did not halve: there the answer would be noise within the prior.
+        the frames did not halve: there the estimate would be noise within the prior.
 
         Args:
             quick: Fewer rounds and no second pass, while frames come in.
 
         Returns:
-            The estimate; links with less than a twentieth of their weight are dropped.
+            The estimate; constraints with weights below 0.05 are dropped.
         """
         schedule = _QUICK if quick else _SCHEDULE
         estimate = self._optimize(self._mount_prior, schedule)
@@ -190,11 +191,11 @@ class Graph:
         problem, n, m = self._problem, self._n, self._m
         X, planes = problem.X_WC, problem.planes.copy()
         mount, base = self._mount, self._base
-        link_weights = np.ones(len(problem.links))
+        constraint_weights = np.ones(len(problem.constraints))
         sight_weights = np.ones(len(problem.sightings))
         for scale in schedule:
             system = NormalEquations(12 * n + 6 + 3 * m)
-            link_weights = self._add_links(system, X, scale)
+            constraint_weights = self._add_constraints(system, X, scale)
             sight_weights = self._add_planes(system, X, planes, scale)
             self._add_arm(system, X, mount, base, mount_prior, scale > _LOOSE)
             step, mount_covariance = system.solve(self._free, 12 * n)
@@ -212,22 +213,26 @@ class Graph:
             mount_observed=np.zeros((6, 6)),
             base=base,
             middle=self._middle,
-            link_weights=np.where(link_weights < 0.05, 0.0, link_weights),
+            constraint_weights=np.where(
+                constraint_weights < 0.05, 0.0, constraint_weights
+            ),
             sight_weights=np.where(sight_weights < 0.05, 0.0, sight_weights),
-            observed=self._observed(X, planes, link_weights, sight_weights),
+            observed=self._observed(X, planes, constraint_weights, sight_weights),
         )
 
-    def _add_links(self, system: NormalEquations, X: Poses, scale: float) -> FloatArray:
+    def _add_constraints(
+        self, system: NormalEquations, X: Poses, scale: float
+    ) -> FloatArray:
         if not len(self._i):
             return np.zeros(0)
-        e, Ji, Jj = self._link_terms(X)
+        e, Ji, Jj = self._constraint_terms(X)
         chi2 = np.einsum("fi,fij,fj->f", e, self._omega, e)
         weights = (scale / (scale + chi2)) ** 2
         W = self._omega * weights[:, None, None]
         system.add([(6 * self._i, Ji), (6 * self._j, Jj)], e, W)
         return np.asarray(weights)
 
-    def _link_terms(self, X: Poses) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _constraint_terms(self, X: Poses) -> tuple[FloatArray, FloatArray, FloatArray]:
         relative = X[self._i].inverse() @ X[self._j]
         e = self._Z.steps_to(relative)
         Rz_T = np.swapaxes(self._Z.R, 1, 2)
@@ -243,7 +248,7 @@ class Graph:
     def _plane_terms(
         self, X: Poses, planes: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Distance of the sight's centre from the landmark, and its axes' tilts."""
+        """Residuals (f, 3): distance to the landmark and two tilts; and Jacobians."""
         R, p = X.R[self._k], X.p[self._k]
         n_W, d = planes[self._l, :3], planes[self._l, 3]
         n_C = np.einsum("fji,fj->fi", R, n_W)
@@ -290,12 +295,12 @@ class Graph:
         mount_prior: FloatArray,
         loose: bool,
     ) -> None:
-        """Adds priors of arm, mount and base."""
+        """Adds the priors of arm, mount and base."""
         config, n, k = self._config, self._n, self._arm
         if not len(k):
             return
-        # Where the arm says it is, after mount and base are put right.
-        inner = self._problem.X_arm[k] @ mount[np.zeros(len(k), np.int64)]
+        # The arm's pose, corrected by mount and base.
+        inner = self._problem.X_WN[k] @ mount[np.zeros(len(k), np.int64)]
         about = Poses(inner.R, inner.p - self._middle)
         expected = base[k] @ about
         expected = Poses(expected.R, expected.p + self._middle)
@@ -321,7 +326,7 @@ class Graph:
         e = base[np.arange(n - 1)].steps_to(base[np.arange(1, n)])
         W = information_of(self._config.base_sigma, self._config.base_sigma_deg)
         chi2 = np.einsum("fi,ij,fj->f", e, W, e)
-        # Loose first, so that a step shows where it is; then steps are rare.
+        # Loose at first, so that a step of the base is found where it happened.
         share = np.full(n - 1, 0.01) if loose else _WALK / (_WALK + chi2)
         weighted = W * share[:, None, None]
         ones = np.tile(np.eye(6), (n - 1, 1, 1))
@@ -329,13 +334,13 @@ class Graph:
         system.add([(start, -ones), (start + 6, ones)], e, weighted)
 
     def _observed(
-        self, X: Poses, planes: FloatArray, links: FloatArray, sights: FloatArray
+        self, X: Poses, planes: FloatArray, constraints: FloatArray, sights: FloatArray
     ) -> FloatArray:
-        """Adds up what links and planes tell of each keyframe, its own axes."""
+        """Sums the information on each keyframe from constraints and planes."""
         result = np.zeros((self._n, 6, 6))
         if len(self._i):
-            _, Ji, Jj = self._link_terms(X)
-            W = self._omega * links[:, None, None]
+            _, Ji, Jj = self._constraint_terms(X)
+            W = self._omega * constraints[:, None, None]
             np.add.at(result, self._i, np.swapaxes(Ji, 1, 2) @ W @ Ji)
             np.add.at(result, self._j, np.swapaxes(Jj, 1, 2) @ W @ Jj)
         if len(self._k):
@@ -346,7 +351,7 @@ class Graph:
 
 
 def _tangents(planes: FloatArray) -> FloatArray:
-    """Returns (m, 3, 2) unit vectors across the normals."""
+    """Returns (m, 3, 2) unit vectors perpendicular to the normals."""
     n = planes[:, :3]
     other = np.eye(3)[np.argmin(np.abs(n), axis=1)]
     first = np.cross(n, other)
@@ -357,7 +362,7 @@ def _tangents(planes: FloatArray) -> FloatArray:
 def _turn_planes(
     planes: FloatArray, steps: FloatArray, middle: FloatArray
 ) -> FloatArray:
-    """Turns planes about their foot below `middle` and moves them along the normal."""
+    """Turns planes about the projection of `middle` and shifts them along normals."""
     if not len(planes):
         return planes
     n = planes[:, :3] + np.einsum("mia,ma->mi", _tangents(planes), steps[:, :2])

@@ -1,4 +1,4 @@
-"""Keyframes with their links and planes: a value that grows, and is solved at need."""
+"""Keyframes with their constraints and planes: an immutable graph to be optimised."""
 
 import bisect
 from collections.abc import Callable, Sequence
@@ -13,6 +13,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FloatArray, FrozenValue, IntArray
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframes.keyframe import Keyframe, PlaneSight
+from perception.mapping.pose_graph.constraints import PoseConstraint
 from perception.mapping.pose_graph.graph import (
     Estimate,
     Graph,
@@ -20,7 +21,6 @@ from perception.mapping.pose_graph.graph import (
     Settled,
     Sighting,
 )
-from perception.mapping.pose_graph.links import PoseConstraint
 from perception.mapping.pose_graph.observability import (
     observed_directions,
     prior_sigmas,
@@ -34,31 +34,31 @@ _Part = TypeVar("_Part")
 
 _PLANE_ANGLE_DEG = 5.0
 _PLANE_DISTANCE = 0.03
-"""A plane is a known one if it is no farther off than this."""
+"""A plane nearer than this, m, and less tilted, to a known one is the same."""
 
 
 @dataclass(frozen=True, eq=False)
 class KeyframeGraph(FrozenValue):
-    """Keyframes, where they are thought to be, and what ties them.
+    """Keyframes, their estimated poses, and the measurements between them.
 
     Attributes:
         intrinsics: Of the camera.
         config: Sigmas and thresholds; never changed.
         keyframes: In order of time.
-        poses: X_WC of each.
-        links: Between them, by the newer keyframe.
-        sightings: Of planes, by keyframe.
+        poses: Estimated X_WC of each.
+        constraints: Between them, ascending by the newer keyframe.
+        sightings: Of planes, ascending by keyframe.
         planes: (m, 4): unit normal in W and offset, n . p = d.
-        sighted: (m,) sightings of each.
-        mount: (6,) step from the arm's camera frame to the true one, so far.
-        base: (n) steps of the base in W at every keyframe, about its origin, so far.
+        sighted: (m,) number of sightings of each.
+        mount: (6,) estimated step from the nominal camera frame N to C.
+        base: (n) estimated steps of the base in W at every keyframe, about its origin.
     """
 
     intrinsics: CameraIntrinsics
     config: PoseGraphConfig
     keyframes: tuple[Keyframe, ...]
     poses: tuple[RigidTransform, ...]
-    links: tuple[PoseConstraint, ...]
+    constraints: tuple[PoseConstraint, ...]
     sightings: tuple[Sighting, ...]
     planes: FloatArray
     sighted: IntArray
@@ -67,7 +67,7 @@ class KeyframeGraph(FrozenValue):
 
     @classmethod
     def empty(cls, intrinsics: CameraIntrinsics, config: PoseGraphConfig) -> Self:
-        """Makes a graph of nothing.
+        """Makes an empty graph.
 
         Args:
             intrinsics: Of the camera.
@@ -82,7 +82,7 @@ class KeyframeGraph(FrozenValue):
             config=config,
             keyframes=(),
             poses=(),
-            links=(),
+            constraints=(),
             sightings=(),
             planes=np.zeros((0, 4)),
             sighted=np.zeros(0, np.int64),
@@ -92,20 +92,20 @@ class KeyframeGraph(FrozenValue):
 
     @property
     def has_arm(self) -> bool:
-        """Whether the arm gave a pose of any keyframe."""
-        return any(keyframe.X_arm is not None for keyframe in self.keyframes)
+        """Whether any keyframe has a pose by the arm."""
+        return any(keyframe.X_WN is not None for keyframe in self.keyframes)
 
-    def predicted(self, X_arm: RigidTransform) -> RigidTransform:
-        """Returns X_WC of a picture that the arm places at `X_arm`."""
-        if self.keyframes and (X_before := self.keyframes[-1].X_arm) is not None:
-            return self.poses[-1] @ X_before.inverse() @ X_arm
-        return X_arm
+    def predicted(self, X_WN: RigidTransform) -> RigidTransform:
+        """Returns X_WC of a picture, given the nominal camera's pose by the arm."""
+        if self.keyframes and (X_before := self.keyframes[-1].X_WN) is not None:
+            return self.poses[-1] @ X_before.inverse() @ X_WN
+        return X_WN
 
     def is_new(self, X_KC: RigidTransform) -> bool:
-        """Tells whether a picture shows enough that the last keyframe did not.
+        """Tells whether a picture shows enough new to become a keyframe.
 
         Args:
-            X_KC: Where it was taken, seen from that keyframe.
+            X_KC: Pose of its camera in the last keyframe's.
         """
         config = self.config
         if np.linalg.norm(X_KC.translation()) > config.keyframe_distance:
@@ -119,14 +119,14 @@ class KeyframeGraph(FrozenValue):
         self,
         keyframe: Keyframe,
         X_WC: RigidTransform,
-        links: list[PoseConstraint] | None = None,
+        constraints: list[PoseConstraint] | None = None,
     ) -> Self:
-        """Returns the graph with a keyframe more.
+        """Returns the graph with one more keyframe.
 
         Args:
             keyframe: The new one.
-            X_WC: Where it is thought to be.
-            links: To older ones, if they are known already; else they are looked for.
+            X_WC: First guess of its pose.
+            constraints: To older ones; None = registers it to them.
         """
         index = len(self.keyframes)
         base = self.base[-1:] if index else Poses.identity(1)
@@ -135,8 +135,8 @@ class KeyframeGraph(FrozenValue):
             poses=(*self.poses, X_WC),
             base=self.base.followed_by(base),
         )
-        if links is None:
-            links = find_constraints(
+        if constraints is None:
+            constraints = find_constraints(
                 grown.keyframes, grown.poses, self.intrinsics, self.config
             )
         planes, sightings = list(self.planes), list(self.sightings)
@@ -148,43 +148,45 @@ class KeyframeGraph(FrozenValue):
         )
         sighted[: len(self.sighted)] += self.sighted
         return grown.replace(
-            links=(*self.links, *links),
+            constraints=(*self.constraints, *constraints),
             sightings=tuple(sightings),
             planes=np.array(planes).reshape(-1, 4),
             sighted=sighted,
         )
 
     def optimized(self) -> tuple[Self, Estimate]:
-        """Returns the graph with all that it holds at its most likely, and more."""
+        """Returns the graph with all keyframes optimised, and the estimate."""
         problem = self._problem(range(len(self.keyframes)))
         estimate = Graph(problem, self.config).optimize()
         return self._moved(problem, estimate), estimate
 
     def settled(self, members: Sequence[int]) -> Self:
-        """Returns the graph with some keyframes at their most likely, by fewer rounds.
+        """Returns the graph with some keyframes optimised, in fewer rounds.
 
-        All others are held where they are, and with them the mount and the planes that
-        they saw, too. What this costs depends on the number of members alone.
+        The others are held fixed, and so are the mount and the planes that others saw.
+        The cost depends on the number of members alone.
 
         Args:
-            members: Numbers of the keyframes to be moved, ascending.
+            members: Numbers of the keyframes to optimise, ascending.
         """
         problem = self._problem(members)
         return self._moved(problem, Graph(problem, self.config).optimize(quick=True))
 
     def _problem(self, members: Sequence[int]) -> Problem:
-        """Returns the members with the older keyframes that links tie them to."""
-        links = [
-            link
+        """Returns the members with the older keyframes of their constraints."""
+        constraints = [
+            constraint
             for k in members
-            for link in _of_number(self.links, k, lambda link: link.j)
+            for constraint in _of_number(
+                self.constraints, k, lambda constraint: constraint.j
+            )
         ]
         sightings = [
             sighting
             for k in members
             for sighting in _of_number(self.sightings, k, lambda sighting: sighting.k)
         ]
-        ends = [*members, *(link.i for link in links)]
+        ends = [*members, *(constraint.i for constraint in constraints)]
         numbers = np.unique(np.array(ends, dtype=np.int64))
         settled = None
         if len(members) < len(self.keyframes):
@@ -198,9 +200,9 @@ class KeyframeGraph(FrozenValue):
         keyframes = [self.keyframes[k] for k in numbers]
         return Problem(
             X_WC=Poses.of([self.poses[k] for k in numbers]),
-            X_arm=Poses.of([k.X_arm or RigidTransform() for k in keyframes]),
-            has_arm=np.array([k.X_arm is not None for k in keyframes]),
-            links=links,
+            X_WN=Poses.of([k.X_WN or RigidTransform() for k in keyframes]),
+            has_arm=np.array([k.X_WN is not None for k in keyframes]),
+            constraints=constraints,
             sightings=sightings,
             planes=self.planes,
             numbers=numbers,
@@ -208,7 +210,7 @@ class KeyframeGraph(FrozenValue):
         )
 
     def _moved(self, problem: Problem, estimate: Estimate) -> Self:
-        """Returns the graph with a problem's keyframes where they are now."""
+        """Returns the graph with the estimate of a problem in it."""
         poses = list(self.poses)
         for k, X_WC in zip(problem.numbers, estimate.X_WC.list(), strict=True):
             poses[k] = X_WC
@@ -222,16 +224,16 @@ class KeyframeGraph(FrozenValue):
         )
 
     def solved(self) -> "Solution":
-        """Returns the last answer: the arm corrected where that is observed."""
+        """Optimises all; corrects the arm's poses along observed directions."""
         graph, estimate = self.optimized()
         observed = np.array(
             [observed_directions(part, self.config) for part in estimate.observed]
         )
         steps = np.zeros((len(self.keyframes), 6))
-        known = [k for k, frame in enumerate(self.keyframes) if frame.X_arm is not None]
+        known = [k for k, frame in enumerate(self.keyframes) if frame.X_WN is not None]
         poses = list(graph.poses)
         if known:
-            by_arm = [self.keyframes[k].X_arm for k in known]
+            by_arm = [self.keyframes[k].X_WN for k in known]
             arm = Poses.of([X for X in by_arm if X is not None])
             sigma = prior_sigmas(self.config)
             scaled = arm.steps_to(estimate.X_WC[np.array(known)]) / sigma
@@ -266,13 +268,13 @@ class KeyframeGraph(FrozenValue):
 
 @dataclass(frozen=True, eq=False)
 class Solution(FrozenValue):
-    """A graph's last answer.
+    """A graph, optimised.
 
     Attributes:
-        graph: With its keyframes where they are now thought to be.
-        estimate: What that rests on, and the slow states.
+        graph: With the final poses of its keyframes.
+        estimate: Of the optimisation, with mount, base and weights.
         observed: (n, 6, 6) projections of the keyframes; see `observed_directions`.
-        corrections: (n, 6) steps from the arm's poses to the keyframes'; 0 without.
+        corrections: (n, 6) steps from the arm's X_WN to X_WC; 0 without an arm.
     """
 
     graph: KeyframeGraph
@@ -282,7 +284,7 @@ class Solution(FrozenValue):
 
     @property
     def mount(self) -> RigidTransform:
-        """The mount's error: the true camera frame seen from the arm's, X_CCm."""
+        """The mount's error X_NC: the camera in the nominal camera frame."""
         turn, shift = self.estimate.mount[:3], self.estimate.mount[3:]
         R = Rotation.from_rotvec(turn.copy()).as_matrix()
         return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), shift)
@@ -291,7 +293,7 @@ class Solution(FrozenValue):
 def _of_number(
     parts: Sequence[_Part], k: int, number: Callable[[_Part], int]
 ) -> Sequence[_Part]:
-    """Returns those of some parts, sorted by number, that have a number."""
+    """Returns the parts with number `k` of parts sorted by number."""
     start = bisect.bisect_left(parts, k, key=number)
     return parts[start : bisect.bisect_right(parts, k, start, key=number)]
 
@@ -299,7 +301,7 @@ def _of_number(
 def _associate(
     sight: PlaneSight, X_WC: RigidTransform, planes: list[FloatArray]
 ) -> int:
-    """Returns the number of the landmark that a plane is; a new one is appended."""
+    """Returns the number of a plane's landmark; appends a new one if none matches."""
     normal = X_WC.rotation() @ sight.normal
     center = X_WC @ sight.center
     best, number = np.inf, len(planes)

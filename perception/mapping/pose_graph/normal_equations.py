@@ -9,19 +9,19 @@ from scipy.sparse.linalg import splu
 from perception.ground import BoolArray, FloatArray, IntArray
 
 _WEAK = 1e-3
-"""Prior on what nothing else holds, in inverse squared metres or radians."""
+"""Prior that makes the matrix regular, in inverse squared metres or radians."""
 
 
 @dataclass
 class NormalEquations:
-    """A sparse least-squares step, added up block by block.
+    """A sparse least-squares step, assembled block by block.
 
     Attributes:
-        size: Unknowns.
-        slope: (size,) of half the sum of squares.
+        size: Number of unknowns.
+        slope: (size,) gradient of half the sum of squares.
         rows: Rows of the matrix's entries, block by block.
         columns: Their columns.
-        values: The entries; those of one place add up.
+        values: The entries; entries of one place are summed.
     """
 
     size: int
@@ -39,9 +39,9 @@ class NormalEquations:
         """Adds factors.
 
         Args:
-            parts: First unknown (f,) and Jacobian (f, r, c) of each part.
+            parts: First unknown (f,) and Jacobian (f, r, c) of each state involved.
             e: (f, r) residuals.
-            W: (f, r, r) their information.
+            W: (f, r, r) information of the residuals.
         """
         for start, J in parts:
             JW = np.swapaxes(J, 1, 2) @ W
@@ -59,12 +59,14 @@ class NormalEquations:
                 )
 
     def solve(self, free: BoolArray, block: int) -> tuple[FloatArray, FloatArray]:
-        """Returns the step that makes the slope vanish.
+        """Solves for the Gauss-Newton step.
 
         Args:
-            free: (size,) the unknowns that move; the others' steps are zero.
-            block: First of the six unknowns whose (6, 6) covariance is returned too;
-                zero where they do not move.
+            free: (size,) bool, unknowns to solve for; the steps of the others are zero.
+            block: First of the six unknowns whose covariance is returned.
+
+        Returns:
+            (size,) step and (6, 6) covariance, zero for unknowns that are not free.
         """
         count = np.count_nonzero(free)
         place = np.cumsum(free) - 1

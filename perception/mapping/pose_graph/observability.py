@@ -1,4 +1,4 @@
-"""What is known of an arm's pose before anything was measured, and what after."""
+"""Prior of an arm's pose, and the directions in which measurements improve it."""
 
 import numpy as np
 
@@ -7,24 +7,24 @@ from perception.mapping.config import PoseGraphConfig
 
 
 def prior_sigmas(config: PoseGraphConfig) -> FloatArray:
-    """Returns (6,) standard deviations of an arm's pose, with its mount's error."""
+    """Returns (6,) standard deviations of an arm's pose, mount error included."""
     turn = np.deg2rad(np.hypot(config.arm_sigma_deg, config.mount_sigma_deg))
     shift = np.hypot(config.arm_sigma, config.mount_sigma)
     return np.array([turn] * 3 + [shift] * 3)
 
 
 def observed_directions(information: FloatArray, config: PoseGraphConfig) -> FloatArray:
-    """Finds the directions that links and planes determine.
+    """Finds the directions that constraints and planes determine.
 
-    A direction is observed if the information cuts the arm's standard deviation along
-    it to `observed_ratio`.
+    A direction is observed if the information reduces the arm's standard deviation
+    along it to `observed_ratio` of the prior.
 
     Args:
-        information: (6, 6) of one keyframe, from links and planes.
+        information: (6, 6) of one keyframe, from constraints and planes.
         config: Sigmas of arm and mount.
 
     Returns:
-        (6, 6) projection on the observed directions, of steps in units of
+        (6, 6) projection onto the observed directions, of steps in units of
         `prior_sigmas`; symmetric.
     """
     sigma = prior_sigmas(config)

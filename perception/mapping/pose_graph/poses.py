@@ -1,6 +1,6 @@
 """Batches of poses: products, errors and small steps, for the pose graph.
 
-A step is (6,): rotation vector, rad, then displacement, m, both in the pose's own axes:
+A step is (6,): rotation vector, rad, and displacement, m, both in the pose's own axes:
 R <- R Exp(a), p <- p + R v.
 """
 
@@ -47,7 +47,7 @@ class Poses:
 
     @classmethod
     def identity(cls, count: int) -> Self:
-        """Makes poses without rotation and translation."""
+        """Makes identity poses."""
         return cls(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
 
     def __len__(self) -> int:
@@ -71,19 +71,19 @@ class Poses:
         return Poses(R, self.p + np.einsum("nij,nj->ni", self.R, steps[:, 3:]))
 
     def followed_by(self, other: "Poses") -> "Poses":
-        """Returns these poses and then others."""
+        """Returns these poses followed by others."""
         return Poses(
             np.concatenate([self.R, other.R]), np.concatenate([self.p, other.p])
         )
 
     def with_rows(self, index: IntArray, other: "Poses") -> "Poses":
-        """Returns the poses with those at `index` exchanged for others."""
+        """Returns the poses with those at `index` replaced."""
         R, p = self.R.copy(), self.p.copy()
         R[index], p[index] = other.R, other.p
         return Poses(R, p)
 
     def about(self, p_AM: FloatArray) -> "Poses":
-        """Returns the same motions of A, turning about a point M instead of A's origin.
+        """Returns the same motions of A, about a point M instead of A's origin.
 
         Args:
             p_AM: (3,) m.
@@ -97,7 +97,7 @@ class Poses:
         return np.hstack([turn, difference.p])
 
     def list(self) -> list[RigidTransform]:
-        """Returns them one by one."""
+        """Returns them as rigid transforms."""
         return [
             RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
             for R, p in zip(self.R, self.p, strict=True)

@@ -1,4 +1,4 @@
-"""To which older keyframes a new one is registered, and by what."""
+"""Registers a new keyframe to older ones."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframes.keyframe import Keyframe
-from perception.mapping.pose_graph.links import (
+from perception.mapping.pose_graph.constraints import (
     ConstraintKind,
     PoseConstraint,
     constraint_by_appearance,
@@ -19,22 +19,22 @@ from perception.mapping.pose_graph.poses import angle_deg
 _RECENT = 2
 """Keyframes back that a new one is always registered to."""
 _CANDIDATES = 12
-"""Older keyframes, the nearest ones, whose overlap is looked at."""
+"""Nearest older keyframes whose overlap is evaluated."""
 _OVERLAP = 0.3
-"""Share of an older keyframe's points that the new one has to see."""
+"""Least share of an older keyframe's points in the new one's view."""
 _GATE = 0.03
-"""A link farther from the arm's relative pose than this, m, is no link."""
+"""A constraint farther than this from the arm's relative pose, m, is rejected."""
 _GATE_DEG = 2.0
 
 
 def overlap(
     keyframe: Keyframe, X_CK: RigidTransform, intrinsics: CameraIntrinsics
 ) -> float:
-    """Returns the share of a keyframe's points that another pose sees.
+    """Returns the share of a keyframe's points in the view of another camera pose.
 
     Args:
         keyframe: Whose points.
-        X_CK: Its pose, seen from the camera at the other one.
+        X_CK: Its pose in the other camera frame.
         intrinsics: Of the camera.
     """
     if not keyframe.sample.size:
@@ -52,11 +52,11 @@ def find_constraints(
     intrinsics: CameraIntrinsics,
     config: PoseGraphConfig,
 ) -> list[PoseConstraint]:
-    """Registers the last keyframe to those before it and to older ones it overlaps.
+    """Registers the last keyframe to its predecessors and to older ones it overlaps.
 
     Args:
         keyframes: In order of time.
-        poses: X_WC, where they are thought to be.
+        poses: X_WC of each, as estimated so far.
         intrinsics: Of the camera.
         config: `max_links` and the sigmas are used.
     """
@@ -71,7 +71,7 @@ def find_constraints(
         (overlap(keyframes[k], X_CW @ poses[k], intrinsics), k)
         for k in np.argsort(away)[:_CANDIDATES].tolist()
     ]
-    # The nearest in the picture, but no two neighbours of each other.
+    # Those that overlap most, but no two neighbours.
     chosen: list[int] = []
     for seen, k in sorted(older, reverse=True):
         if seen > _OVERLAP and all(abs(k - other) > 1 for other in chosen):
@@ -88,7 +88,7 @@ def find_constraints(
         )
         for k in chosen
     ]
-    return [link for link in found if link is not None]
+    return [constraint for constraint in found if constraint is not None]
 
 
 def _register(
@@ -99,18 +99,20 @@ def _register(
     config: PoseGraphConfig,
     ends: tuple[int, int],
 ) -> PoseConstraint | None:
-    """Links two keyframes by appearance, or else by geometry."""
-    link, _ = constraint_by_appearance(a.features, b.features, intrinsics, config, ends)
-    if link is None:
+    """Registers two keyframes by appearance, or else by geometry."""
+    constraint, _ = constraint_by_appearance(
+        a.features, b.features, intrinsics, config, ends
+    )
+    if constraint is None:
         grids = a.grid(intrinsics), b.grid(intrinsics)
-        link = constraint_by_geometry(*grids, guess, intrinsics, config, ends)
-    if link is None:
+        constraint = constraint_by_geometry(*grids, guess, intrinsics, config, ends)
+    if constraint is None:
         return None
-    off = guess.inverse() @ link.X_ij
-    arm = a.X_arm is not None and b.X_arm is not None
-    if (arm or link.kind is ConstraintKind.GEOMETRY) and (
+    off = guess.inverse() @ constraint.X_ij
+    arm = a.X_WN is not None and b.X_WN is not None
+    if (arm or constraint.kind is ConstraintKind.GEOMETRY) and (
         np.linalg.norm(off.translation()) > _GATE
         or angle_deg(off.rotation()) > _GATE_DEG
     ):
         return None
-    return link
+    return constraint

@@ -1,4 +1,4 @@
 """Sessions: frames in, map out, live or recorded, with store, resume and report.
 
-The top of mapping: it may use every other room of it.
+The top room of mapping: it may use all others.
 """

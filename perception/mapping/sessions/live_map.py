@@ -1,4 +1,4 @@
-"""The map while the arm scans: fused at once, and corrected when it is asked for."""
+"""The map while the arm scans: fused at once, corrected on request."""
 
 import functools
 from dataclasses import dataclass
@@ -27,44 +27,44 @@ from perception.values import SurfaceMap
 
 @dataclass(frozen=True, eq=False)
 class FusedPicture(FrozenValue):
-    """A picture as it went into the voxels, kept to be fused again elsewhere.
+    """A fused picture, kept so that it can be fused again at a corrected pose.
 
     Attributes:
         picture: Its pixels.
-        X_arm: Where the arm says that it was taken, in W.
-        keyframe: Number of the keyframe that it goes with.
+        X_WN: Pose of the nominal camera by the arm.
+        keyframe: Number of the last keyframe when it was taken.
     """
 
     picture: ThinPicture
-    X_arm: RigidTransform
+    X_WN: RigidTransform
     keyframe: int
 
 
 @dataclass(frozen=True, eq=False)
 class LiveMap(FrozenValue):
-    """One map of the wall, fused by the arm's poses and put right by what it shows.
+    """One map of the wall, fused at the arm's poses and corrected by a pose graph.
 
-    While pictures come they are fused where arm and mount say, which costs little. When
-    the surface is asked for, and the arm stands still, the pose graph is solved; if
-    that moves the surface by more than `PoseGraphConfig.refuse_distance`, all pictures
-    are fused again where they really were taken. Below that the arm is believed: a scan
-    by a good arm gives the same map, to the bit, as without the graph.
+    Incoming pictures are fused at the poses of arm and mount, which is cheap. When the
+    surface is requested, while the arm stands still, the pose graph is solved. If that
+    moves the surface by more than `PoseGraphConfig.refuse_distance`, all pictures are
+    fused again at their corrected poses. Otherwise the arm's poses stand: a scan by a
+    good arm gives the same map, to the bit, as without the graph.
 
-    Time and memory are those of one tile's scan: a restart drops the pictures. What is
-    to go on for longer is a `Mapper`'s work.
+    Time and memory are bounded by one tile's scan: a restart drops the pictures. Use a
+    `Mapper` for longer sequences.
 
     Attributes:
-        voxels: Fused by the arm's poses and `X_CCm`.
-        pictures: What is in them.
+        voxels: Fused at the arm's poses and `X_NC`.
+        pictures: Those in `voxels`.
         graph: Keyframes of all pictures, also of those before the last restart.
-        X_CCm: The mount's error as known at the last restart: where the camera is, seen
-            from where the arm's model has it.
+        X_NC: The mount's error as estimated at the last restart: pose of the camera in
+            the nominal camera frame of the arm's model.
     """
 
     voxels: VoxelMap
     pictures: tuple[FusedPicture, ...]
     graph: KeyframeGraph
-    X_CCm: RigidTransform
+    X_NC: RigidTransform
 
     @classmethod
     def empty(
@@ -75,7 +75,7 @@ class LiveMap(FrozenValue):
         intrinsics: CameraIntrinsics,
         graph_config: PoseGraphConfig,
     ) -> Self:
-        """Makes a map of nothing round a tile.
+        """Makes an empty map around a tile.
 
         Args:
             X_WV: Tile frame of the expected wall in W.
@@ -92,23 +92,23 @@ class LiveMap(FrozenValue):
         return cls(voxels, (), graph, RigidTransform())
 
     def restarted(self, X_WV: RigidTransform) -> Self:
-        """Returns a map of nothing in another tile frame, with what was learned.
+        """Returns an empty map in another tile frame; keeps the graph and the mount.
 
         Args:
             X_WV: Tile frame of the wall that was found, in W.
         """
         old = self.voxels
         voxels = VoxelMap.empty(X_WV, old.width, old.height, old.config)
-        X_CCm = self.solution.mount if self.is_moved else self.X_CCm
-        return self.replace(voxels=voxels, pictures=(), X_CCm=X_CCm)
+        X_NC = self.solution.mount if self.is_moved else self.X_NC
+        return self.replace(voxels=voxels, pictures=(), X_NC=X_NC)
 
-    def fused(self, time: float, depth_mm: DepthImage, X_arm: RigidTransform) -> Self:
-        """Returns the map with a picture more.
+    def fused(self, time: float, depth_mm: DepthImage, X_WN: RigidTransform) -> Self:
+        """Returns the map with one more picture.
 
         Args:
             time: When it was taken, s.
             depth_mm: (H, W) uint16, mm, 0 = no return.
-            X_arm: Where the arm says that it was taken, in W.
+            X_WN: Pose of the nominal camera by the arm.
 
         Raises:
             ValueError: The picture is not of the camera's size.
@@ -116,10 +116,10 @@ class LiveMap(FrozenValue):
         config, intrinsics = self.voxels.config, self.graph.intrinsics
         usable = usable_pixels(depth_mm, config)
         p_CQs = depth_points(depth_mm, usable, intrinsics, config.stride)
-        graph = self._with_keyframe(time, depth_mm, usable, X_arm)
+        graph = self._with_keyframe(time, depth_mm, usable, X_WN)
         thin = ThinPicture.of(depth_mm, usable, config.stride)
-        picture = FusedPicture(thin, X_arm, len(graph.keyframes) - 1)
-        X_WC = X_arm @ self.X_CCm
+        picture = FusedPicture(thin, X_WN, len(graph.keyframes) - 1)
+        X_WC = X_WN @ self.X_NC
         return self.replace(
             voxels=self.voxels.fuse(X_WC @ p_CQs, X_WC.translation()),
             pictures=(*self.pictures, picture),
@@ -128,12 +128,12 @@ class LiveMap(FrozenValue):
 
     @functools.cached_property
     def solution(self) -> Solution:
-        """The pose graph's answer."""
+        """The optimised pose graph."""
         return self.graph.solved()
 
     @functools.cached_property
     def moved_by(self) -> float:
-        """How far the answer moves what is in the voxels, root mean square, m."""
+        """How far the solution moves the points in the voxels, root mean square, m."""
         squares = []
         for k in sorted({picture.keyframe for picture in self.pictures}):
             X_CfC = self._X_WCf(k).inverse() @ self.solution.graph.poses[k]
@@ -145,7 +145,7 @@ class LiveMap(FrozenValue):
 
     @property
     def is_moved(self) -> bool:
-        """Whether that is more than may be left as it is."""
+        """Whether `moved_by` exceeds `PoseGraphConfig.refuse_distance`."""
         return self.moved_by > self.graph.config.refuse_distance
 
     @functools.cached_property
@@ -158,39 +158,39 @@ class LiveMap(FrozenValue):
         return surface.replace(mount_tilt=float(tilt))
 
     def _X_WCf(self, k: int) -> RigidTransform:
-        """Returns where keyframe k was fused."""
-        X_arm = self.graph.keyframes[k].X_arm
-        assert X_arm is not None  # Every keyframe here was made with one.
-        return X_arm @ self.X_CCm
+        """Returns the pose at which keyframe k was fused."""
+        X_WN = self.graph.keyframes[k].X_WN
+        assert X_WN is not None  # Every keyframe here was made with one.
+        return X_WN @ self.X_NC
 
     def _with_keyframe(
         self,
         time: float,
         depth_mm: DepthImage,
         usable: BoolArray,
-        X_arm: RigidTransform,
+        X_WN: RigidTransform,
     ) -> KeyframeGraph:
         graph = self.graph
         if graph.keyframes:
-            X_before = graph.keyframes[-1].X_arm
-            if X_before is not None and not graph.is_new(X_before.inverse() @ X_arm):
+            X_before = graph.keyframes[-1].X_WN
+            if X_before is not None and not graph.is_new(X_before.inverse() @ X_WN):
                 return graph
         number = len(graph.keyframes)
         z = mean_depth(depth_mm, usable)
         planes = see_planes(grid_of(z, graph.intrinsics), graph.config, number)
         sample = sample_of(z, graph.intrinsics)
-        keyframe = Keyframe(number, time, X_arm, tuple(planes), sample, View(z))
-        return graph.extended(keyframe, X_arm @ self.X_CCm)
+        keyframe = Keyframe(number, time, X_WN, tuple(planes), sample, View(z))
+        return graph.extended(keyframe, X_WN @ self.X_NC)
 
     def _fused_again(self) -> VoxelMap:
-        """Fuses all pictures where the graph's answer has them."""
+        """Fuses all pictures at their corrected poses."""
         old, intrinsics = self.voxels, self.graph.intrinsics
         voxels = VoxelMap.empty(old.X_WV, old.width, old.height, old.config)
         for fused in self.pictures:
             k, thin = fused.keyframe, fused.picture
             depth_mm = thin.depth_mm
             p_CQs = depth_points(depth_mm, depth_mm > 0, thin.camera(intrinsics))
-            X_KC = self._X_WCf(k).inverse() @ fused.X_arm @ self.X_CCm
+            X_KC = self._X_WCf(k).inverse() @ fused.X_WN @ self.X_NC
             X_WC = self.solution.graph.poses[k] @ X_KC
             voxels = voxels.fuse(X_WC @ p_CQs, X_WC.translation())
         return voxels

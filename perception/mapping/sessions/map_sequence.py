@@ -29,7 +29,7 @@ class MappedSequence:
 
     Attributes:
         result: Poses of the frames, keyframes and the fused surface.
-        report: Figures as JSON values: frames, links, corrections, observed
+        report: Figures as JSON values: frames, constraints, corrections, observed
             directions, timings.
     """
 
@@ -85,8 +85,8 @@ def map_sequence(
 
     Raises:
         CloudReadError: A file is unusable.
-        NoMapError: There is no map that could be right.
-        NotLocalisedError: The map `onto` does not show where the sequence was taken.
+        NoMapError: No valid map can be made.
+        NotLocalisedError: The sequence is not recognised in the map `onto`.
     """
     frames = Path(frames)
     config = MapperConfig() if config is None else config
@@ -160,7 +160,7 @@ def _join(
         )
     result, found = join_map(mapper, known)
     figures = {
-        "X_MN": found.X_MN.GetAsMatrix4().round(6).tolist(),
+        "X_MN": found.X_MW.GetAsMatrix4().round(6).tolist(),
         "keyframes_agreeing": found.agreeing,
         "keyframes_recognised": found.found,
     }

@@ -1,4 +1,4 @@
-"""Takes frames one by one, keeps keyframes, links them, and makes the map."""
+"""Maps frames one by one: keyframes, constraints, pose graph, surface."""
 
 import enum
 import time
@@ -16,29 +16,29 @@ from perception.mapping.fusion.fusion import FusedMap, fuse
 from perception.mapping.keyframes.keyframe import Keyframe, find_features, make_keyframe
 from perception.mapping.keyframes.view import Features
 from perception.mapping.keyframes.working_set import WorkingSet
-from perception.mapping.pose_graph.keyframe_graph import KeyframeGraph, Solution
-from perception.mapping.pose_graph.links import (
+from perception.mapping.pose_graph.constraints import (
     ConstraintKind,
     PoseConstraint,
     constraint_by_appearance,
 )
+from perception.mapping.pose_graph.keyframe_graph import KeyframeGraph, Solution
 
 _PATIENCE = 10
-"""Frames that may be lost before a map without poses is given up."""
-_FAR = 0.05
-"""Links at least so long tell the camera's scale, m,"""
-_FEWEST = 10
-"""if there are so many,"""
+"""Lost frames after which a map without poses is given up."""
+_SCALE_BASELINE = 0.05
+"""Shortest constraint from which the camera's scale is checked, m."""
+_SCALE_COUNT = 10
+"""Fewest such constraints."""
 _SCALE = 0.03
-"""and pictures that move by another share than this are of another camera."""
+"""Largest deviation of the camera's motion from the arm's, a share of it."""
 
 
 class NoMapError(PerceptionError):
-    """There is no map that could be right; the message says why."""
+    """No valid map can be made; the message gives the reason."""
 
 
 class Outcome(enum.StrEnum):
-    """What became of a frame."""
+    """How a frame was used."""
 
     KEYFRAME = "keyframe"
     TRACKED = "tracked"
@@ -50,11 +50,11 @@ class Outcome(enum.StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class MappingResult:
-    """The map and how it came about.
+    """The map with its poses.
 
     Attributes:
-        poses: Time, s, and X_WC of every frame that could be placed.
-        solution: The keyframes' poses, and what they rest on.
+        poses: Time, s, and X_WC of every frame that has a pose.
+        solution: The optimised pose graph.
         fused: The surface.
     """
 
@@ -66,29 +66,28 @@ class MappingResult:
 class Mapper:
     """Maps a sequence; `add` the frames, then `finish`.
 
-    While frames come, time and memory are bounded by `MapperConfig.working_set` (w):
+    Between `add` calls, `MapperConfig.working_set` (w) bounds time and memory:
 
-    - at most w keyframes have corners, depths and pixels in memory, those that were
-      made or registered last; the others wait in a file and come back at need;
+    - at most w keyframes have corners, depths and pixels in memory, those made or
+      registered last; the others are in a file and are read back when needed;
     - every `optimize_every` keyframes these w are solved for, with at most w times
-      `max_links` links; all else is held where it is (see `KeyframeGraph.settled`).
+      `max_links` constraints; all else is held fixed (see `KeyframeGraph.settled`).
 
-    What grows is small: poses, planes, links and sampled points stay, some 12 kB a
-    keyframe, and so does a pose of each frame; finding the nearest keyframes takes
-    1 us for each there is. Only `finish` solves for all keyframes, and fuses them one
-    after the other: it is for the end, or for later from the session's file.
+    Poses, planes, constraints and sampled points stay in memory, about 12 kB per
+    keyframe, and one pose per frame; finding the nearest keyframes takes 1 us for each.
+    Only `finish` solves for all keyframes and fuses them one after the other.
 
     Attributes:
         config: Settings; not to be changed.
-        graph: Keyframes so far, with links and planes.
-        outcomes: How many frames came to what.
+        graph: Keyframes so far, with constraints and planes.
+        outcomes: Number of frames by outcome.
         seconds: CPU time of every keyframe, s.
         fuse_seconds: CPU time of the last optimisation and of the fusion, s.
         placed: Time, s, last keyframe k and X_KC of every frame that has a pose.
     """
 
     def __init__(self, intrinsics: CameraIntrinsics, config: MapperConfig) -> None:
-        """Starts with nothing.
+        """Starts an empty map.
 
         Args:
             intrinsics: Of the camera.
@@ -109,10 +108,10 @@ class Mapper:
         self._best_inliers = 0
 
     def add(self, frame: Frame) -> Outcome:
-        """Takes the next frame.
+        """Adds the next frame.
 
         Raises:
-            NoMapError: Frames without poses cannot be followed.
+            NoMapError: Frames without poses cannot be tracked.
         """
         start = time.process_time()
         outcome = self._add(frame)
@@ -125,7 +124,7 @@ class Mapper:
         return outcome
 
     def finish(self) -> MappingResult:
-        """Optimises a last time and fuses the map.
+        """Optimises all keyframes and fuses the map.
 
         Raises:
             NoMapError: There is no keyframe, or most frames were lost.
@@ -183,40 +182,40 @@ class Mapper:
         frame: Frame,
         number: int,
         X_WC: RigidTransform,
-        links: list[PoseConstraint],
+        constraints: list[PoseConstraint],
     ) -> None:
-        """Takes a keyframe back from a store, with the links that were found then."""
+        """Adds a keyframe from a store with its stored constraints."""
         features = find_features(frame, self._intrinsics, self.config)
         keyframe = make_keyframe(frame, number, features, self._intrinsics, self.config)
-        self.add_keyframe(keyframe, X_WC, links)
+        self.add_keyframe(keyframe, X_WC, constraints)
 
     def add_keyframe(
         self,
         keyframe: Keyframe,
         X_WC: RigidTransform,
-        links: list[PoseConstraint] | None = None,
+        constraints: list[PoseConstraint] | None = None,
     ) -> None:
-        """Takes a keyframe.
+        """Adds a keyframe.
 
         Args:
             keyframe: The new one.
-            X_WC: Where it is thought to be.
-            links: To older ones, if they are known already; else they are looked for.
+            X_WC: First guess of its pose.
+            constraints: To older ones; None = registers it to them.
         """
         index = len(self.graph.keyframes)
         self.placed.append((keyframe.time, index, RigidTransform()))
         self._last_time = max(self._last_time, keyframe.time)
         keyframe = self._working_set.take(index, keyframe)
-        self.graph = self.graph.extended(keyframe, X_WC, links)
+        self.graph = self.graph.extended(keyframe, X_WC, constraints)
         if index and index % self.config.optimize_every == 0:
             self.graph = self.graph.settled(self._working_set.members)
 
     def _track(self, features: Features) -> PoseConstraint | None:
-        """Finds a frame by appearance among the last keyframes."""
+        """Registers a frame to one of the last keyframes by appearance."""
         self._best_inliers = 0
         keyframes = self.graph.keyframes
         for index in reversed(range(max(0, len(keyframes) - 3), len(keyframes))):
-            link, inliers = constraint_by_appearance(
+            constraint, inliers = constraint_by_appearance(
                 keyframes[index].features,
                 features,
                 self._intrinsics,
@@ -224,14 +223,14 @@ class Mapper:
                 (index, len(keyframes)),
             )
             self._best_inliers = max(self._best_inliers, inliers)
-            if link is not None:
-                return link
+            if constraint is not None:
+                return constraint
         return None
 
     def _predict(
         self, frame: Frame, tracked: PoseConstraint | None
     ) -> RigidTransform | None:
-        """Returns where the frame was taken, or None if nothing tells."""
+        """Returns the first guess of X_WC, or None if there is none."""
         if tracked is not None:
             return self.graph.poses[tracked.i] @ tracked.X_ij
         if frame.X_WC is None:
@@ -239,22 +238,26 @@ class Mapper:
         return self.graph.predicted(frame.X_WC)
 
     def _check_scale(self) -> None:
-        """Raises if pictures and arm do not move alike; a bare wall cannot tell."""
+        """Raises if camera and arm move differently; a bare wall does not show it."""
         ratios = []
-        for link in self.graph.links:
-            a, b = (self.graph.keyframes[k].X_arm for k in (link.i, link.j))
-            if link.kind is not ConstraintKind.APPEARANCE or a is None or b is None:
+        for constraint in self.graph.constraints:
+            a, b = (self.graph.keyframes[k].X_WN for k in (constraint.i, constraint.j))
+            if (
+                constraint.kind is not ConstraintKind.APPEARANCE
+                or a is None
+                or b is None
+            ):
                 continue
             by_arm = np.linalg.norm((a.inverse() @ b).translation())
-            if by_arm > _FAR:
-                ratios.append(np.linalg.norm(link.X_ij.translation()) / by_arm)
-        if len(ratios) < _FEWEST:
+            if by_arm > _SCALE_BASELINE:
+                ratios.append(np.linalg.norm(constraint.X_ij.translation()) / by_arm)
+        if len(ratios) < _SCALE_COUNT:
             return
         ratio = float(np.median(ratios))
         if abs(ratio - 1.0) > _SCALE:
             raise NoMapError(
-                f"the pictures move {ratio:.3f} times as far as the arm, 1 +- {_SCALE} "
-                "is allowed: the camera's focal length or depth unit is wrong.",
+                f"the pictures move {ratio:.3f} times as far as the arm; the limit is "
+                f"1 +- {_SCALE}: correct the camera's focal length or depth unit.",
                 code="PNT-MAP-001",
             )
 
@@ -262,12 +265,13 @@ class Mapper:
         lost, total = self.outcomes[Outcome.LOST], sum(self.outcomes.values())
         if lost:
             return NoMapError(
-                f"{lost} of {total} frames have no pose and could not be followed: "
+                f"{lost} of {total} frames have no pose and could not be tracked: "
                 f"{self._best_inliers} corners agree, {self.config.min_inliers} are "
-                "needed. The wall shows too little texture; give the arm's poses.",
+                "needed. The wall has too little texture; give the arm's poses.",
                 code="PNT-MAP-002",
             )
         counts = ", ".join(f"{name}: {n}" for name, n in self.outcomes.items())
         return NoMapError(
-            f"no frame can be used ({counts or 'there is none'}).", code="PNT-MAP-003"
+            f"no frame is usable ({counts or 'the sequence is empty'}).",
+            code="PNT-MAP-003",
         )

@@ -1,4 +1,4 @@
-"""Finds where a session lies in a map by what its pictures show, and joins them."""
+"""Localises a session in a map by appearance, and joins the two."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,57 +11,57 @@ from scipy import sparse
 from perception.errors import PerceptionError
 from perception.mapping.keyframes.keyframe import Keyframe
 from perception.mapping.keyframes.view import Features
+from perception.mapping.pose_graph.constraints import constraint_by_appearance
 from perception.mapping.pose_graph.keyframe_graph import KeyframeGraph
-from perception.mapping.pose_graph.links import constraint_by_appearance
 from perception.mapping.pose_graph.poses import angle_deg
 
 _TABLES = 12
 _BITS = 11
-"""A descriptor is as many words as there are tables, each this many of its 256 bits:
-two that differ in a twentieth of their bits still share half of their words."""
+"""Each table makes one word of this many of a descriptor's 256 bits: two descriptors
+that differ in a twentieth of their bits still share half of their words."""
 _SEED = 5
 _CANDIDATES = 3
-"""Keyframes of the map that are matched to a new one, the likeliest."""
+"""Likeliest keyframes of the map that are matched to a new one."""
 _NEAR = 0.02
-"""Two keyframes agree on where the session lies within this, m, at their place,"""
+"""Two keyframes agree if they place the camera within this, m, and `_NEAR_DEG`."""
 _NEAR_DEG = 1.0
 _AGREEING = 3
-"""and so many have to, at least,"""
+"""Fewest keyframes that must agree."""
 _SHARE = 0.6
-"""and this share of those that found a place at all: else there is no jump."""
+"""Least share of the recognised keyframes that must agree."""
 
 
 class NotLocalisedError(PerceptionError):
-    """A session's place in a map cannot be told; the message says why."""
+    """A session cannot be localised in a map; the message gives the reason."""
 
 
 @dataclass(frozen=True)
 class Localisation:
-    """Where a session lies.
+    """Pose of a session in a map.
 
     Attributes:
-        X_MN: Pose of the session's world N in the map's, M.
-        agreeing: Keyframes that say so.
-        found: Keyframes that found any place.
+        X_MW: Pose of the session's world W in the map's, M.
+        agreeing: Keyframes that agree on it.
+        found: Keyframes that were recognised.
     """
 
-    X_MN: RigidTransform
+    X_MW: RigidTransform
     agreeing: int
     found: int
 
 
 class Places:
-    """Keyframes as bags of words, weighted by how seldom a word is.
+    """Keyframes as bags of words, weighted by inverse document frequency.
 
-    The words are bits of the descriptors, so that there is nothing to be learned: a
-    vocabulary by locality-sensitive hashing.
+    Words are bits of the descriptors: a vocabulary by locality-sensitive hashing, which
+    needs no training.
 
     Source: Sivic and Zisserman, "Video Google", 2003 (tf-idf); Indyk and Motwani,
     "Approximate nearest neighbors", 1998 (bit sampling).
     """
 
     def __init__(self, keyframes: Sequence[Keyframe]) -> None:
-        """Counts the words of the keyframes that are to be found again."""
+        """Counts the words of the keyframes to be recognised."""
         rng = np.random.default_rng(_SEED)
         self._bits = np.stack([rng.permutation(256)[:_BITS] for _ in range(_TABLES)])
         counts = sparse.vstack(
@@ -72,7 +72,7 @@ class Places:
         self._bags = self._weighted(counts)
 
     def likely(self, features: Features, count: int) -> list[int]:
-        """Returns the numbers of the keyframes that look most alike, best first."""
+        """Returns the numbers of the most similar keyframes, best first."""
         bag = self._weighted(self._count(features))
         scores = (self._bags @ bag.T).toarray().ravel()
         best = np.argsort(-scores, kind="stable")[:count]
@@ -93,10 +93,10 @@ class Places:
 
 
 def localise(known: KeyframeGraph, session: KeyframeGraph) -> Localisation:
-    """Finds where a session lies in a map, which stays as it is.
+    """Finds the pose of a session in a map; the map does not change.
 
-    Each keyframe is matched to the likeliest ones of the map and placed by PnP; only
-    where enough of them agree is the answer believed.
+    Each keyframe is matched to the likeliest ones of the map and placed by PnP. The
+    answer is accepted only if enough of them agree.
 
     Args:
         known: The map.
@@ -108,46 +108,46 @@ def localise(known: KeyframeGraph, session: KeyframeGraph) -> Localisation:
     guesses: list[tuple[RigidTransform, RigidTransform]] = []
     places = Places(known.keyframes)
     for number, keyframe in enumerate(session.keyframes):
-        X_NC = session.poses[number]
+        X_WC = session.poses[number]
         for k in places.likely(keyframe.features, _CANDIDATES):
-            link, _ = constraint_by_appearance(
+            constraint, _ = constraint_by_appearance(
                 known.keyframes[k].features,
                 keyframe.features,
                 known.intrinsics,
                 known.config,
                 (k, number),
             )
-            if link is not None:
-                X_MN = known.poses[k] @ link.X_ij @ X_NC.inverse()
-                guesses.append((X_MN, X_NC))
+            if constraint is not None:
+                X_MW = known.poses[k] @ constraint.X_ij @ X_WC.inverse()
+                guesses.append((X_MW, X_WC))
                 break
     support = [sum(_agree(guess, other) for other in guesses) for guess in guesses]
     most = max(support, default=0)
     if most < max(_AGREEING, _SHARE * len(guesses)):
         raise NotLocalisedError(
-            f"the map shows where {len(guesses)} of {len(session.keyframes)} keyframes "
-            f"were taken, and {most} of them agree; {_AGREEING} and {_SHARE:.0%} are "
-            "needed. The session stays apart.",
+            f"{len(guesses)} of {len(session.keyframes)} keyframes are recognised in "
+            f"the map, and {most} agree; at least {_AGREEING} and {_SHARE:.0%} must. "
+            "The session is not joined.",
             code="PNT-MAP-004",
         )
     best = guesses[support.index(most)][0]
-    return Localisation(X_MN=best, agreeing=most, found=len(guesses))
+    return Localisation(X_MW=best, agreeing=most, found=len(guesses))
 
 
 def joined(
-    known: KeyframeGraph, session: KeyframeGraph, X_MN: RigidTransform
+    known: KeyframeGraph, session: KeyframeGraph, X_MW: RigidTransform
 ) -> KeyframeGraph:
-    """Returns the map with a session's keyframes in it, linked to both.
+    """Returns the map with a session's keyframes added and registered.
 
     Args:
         known: The map.
         session: Keyframes with poses in the session's own world.
-        X_MN: Pose of that world in the map's.
+        X_MW: Pose of that world in the map's.
     """
     for number, keyframe in enumerate(session.keyframes):
-        X_arm = None if keyframe.X_arm is None else X_MN @ keyframe.X_arm
+        X_WN = None if keyframe.X_WN is None else X_MW @ keyframe.X_WN
         known = known.extended(
-            keyframe.replace(X_arm=X_arm), X_MN @ session.poses[number]
+            keyframe.replace(X_WN=X_WN), X_MW @ session.poses[number]
         )
     return known
 
@@ -156,9 +156,9 @@ def _agree(
     guess: tuple[RigidTransform, RigidTransform],
     other: tuple[RigidTransform, RigidTransform],
 ) -> bool:
-    """Tells whether two guesses put the first one's camera at the same place."""
-    (X_MN, X_NC), (X_MN2, _) = guess, other
-    apart = (X_MN @ X_NC).inverse() @ (X_MN2 @ X_NC)
+    """Tells whether two guesses give the first one's camera the same pose."""
+    (X_MW, X_WC), (X_MW2, _) = guess, other
+    apart = (X_MW @ X_WC).inverse() @ (X_MW2 @ X_WC)
     return bool(
         np.linalg.norm(apart.translation()) < _NEAR
         and angle_deg(apart.rotation()) < _NEAR_DEG

@@ -19,19 +19,19 @@ def session_report(mapper: Mapper, result: MappingResult) -> dict[str, Any]:
     """Makes the report.
 
     Directions are those of the main plane seen from the cameras: x right, y up, and
-    the normal. A direction counts as observed in a keyframe if most of a step along it
-    lies in what links and planes determine; only there the arm's pose was corrected.
+    the normal. A direction counts as observed in a keyframe if constraints and planes
+    determine most of a step along it; only there the arm's pose was corrected.
 
     Args:
         mapper: After `finish`.
         result: What that returned.
 
     Returns:
-        Names and values; all that depends on the machine is under `timing`.
+        Names and values; those that depend on the machine are under `timing`.
     """
     graph, estimate = result.solution.graph, result.solution.estimate
     fused = result.fused
-    kinds = Counter(str(link.kind) for link in graph.links)
+    kinds = Counter(str(constraint.kind) for constraint in graph.constraints)
     R_VW = fused.X_WV.rotation().matrix().T
     shares, steps = _by_direction(result.solution, R_VW)
     has_arm = graph.has_arm
@@ -42,7 +42,7 @@ def session_report(mapper: Mapper, result: MappingResult) -> dict[str, Any]:
         "frames": {str(name): count for name, count in mapper.outcomes.items()},
         "keyframes": len(graph.keyframes),
         "links": dict(kinds),
-        "links_dropped": int(np.count_nonzero(estimate.link_weights == 0.0)),
+        "links_dropped": int(np.count_nonzero(estimate.constraint_weights == 0.0)),
         "planes": [
             {"normal": plane[:3].round(6).tolist(), "offset_m": round(plane[3], 6)}
             for plane in estimate.planes

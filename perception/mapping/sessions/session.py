@@ -16,17 +16,16 @@ def run_session(
     store: MapStore | None = None,
     show: Callable[[int], None] | None = None,
 ) -> MappingResult:
-    """Maps all frames; goes on where a stored session broke off.
+    """Maps all frames; continues a stored session that was interrupted.
 
     Args:
         mapper: A new one.
         frames: In order of time; numbers of frames count from the first one on.
-        store: Where keyframes are kept as they come; frames that it knows are not
-            looked at again.
+        store: Keeps keyframes as they come; frames that it holds are not mapped again.
         show: Called with each frame's number.
 
     Raises:
-        NoMapError: There is no map that could be right.
+        NoMapError: No valid map can be made.
     """
     done = -1 if store is None else _restore(mapper, store)
     for number, frame in enumerate(frames):
@@ -44,24 +43,24 @@ def run_session(
 
 
 def join_map(mapper: Mapper, store: MapStore) -> tuple[MappingResult, Localisation]:
-    """Finds where a session lies in a stored map and maps both as one.
+    """Localises a session in a stored map and maps both as one.
 
     Args:
         mapper: After `finish`; becomes the one of both sessions.
-        store: The map, with keyframes; it stays as it is.
+        store: The map, with keyframes; does not change.
 
     Returns:
         The map of both in the stored one's world, with the poses of the mapper's own
-        frames, and where that session's world lies in it.
+        frames, and the pose of that session's world in it.
 
     Raises:
-        NotLocalisedError: The map does not show where the session was taken.
+        NotLocalisedError: The session is not recognised in the map.
     """
     older = Mapper(mapper.graph.intrinsics, mapper.config)
     _restore(older, store)
     known = older.graph.solved().graph
     found = localise(known, mapper.graph)
-    mapper.graph = joined(known, mapper.graph, found.X_MN)
+    mapper.graph = joined(known, mapper.graph, found.X_MW)
     count = len(known.keyframes)
     mapper.placed = [(time, count + k, X_KC) for time, k, X_KC in mapper.placed]
     return mapper.finish(), found
@@ -77,16 +76,18 @@ def _save(
     if outcome is Outcome.KEYFRAME:
         graph = mapper.graph
         k = len(graph.keyframes) - 1
-        links = [link for link in graph.links if link.j == k]
-        store.save_keyframe(k, number, frame, graph.poses[k], links)
+        constraints = [
+            constraint for constraint in graph.constraints if constraint.j == k
+        ]
+        store.save_keyframe(k, number, frame, graph.poses[k], constraints)
     store.save_frame(number, frame.time, outcome, placed)
 
 
 def _restore(mapper: Mapper, store: MapStore) -> int:
-    """Brings the mapper to where the store is; returns the last frame's number."""
+    """Restores the mapper from the store; returns the last frame's number."""
     last = -1
-    for number, frame, X_WC, links in store.keyframes():
-        mapper.restore(frame, number, X_WC, links)
+    for number, frame, X_WC, constraints in store.keyframes():
+        mapper.restore(frame, number, X_WC, constraints)
         last = number
     mapper.placed.clear()
     numbers = set()

@@ -1,7 +1,7 @@
-"""The mapping session in one SQLite file: resume it, or map it again otherwise.
+"""A mapping session in one SQLite file, to be resumed or mapped again.
 
-Every keyframe is one transaction with its raw pictures, poses and links, so a process
-that is killed loses none that was finished.
+Every keyframe is one transaction with its raw pictures, poses and constraints, so a
+process that is killed loses no finished keyframe.
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.errors import CloudReadError
 from perception.io.frames import Frame
 from perception.mapping.config import MapperConfig
-from perception.mapping.pose_graph.links import ConstraintKind, PoseConstraint
+from perception.mapping.pose_graph.constraints import ConstraintKind, PoseConstraint
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS info (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -39,13 +39,13 @@ class MapStore:
     """One session's file; a context manager."""
 
     def __init__(self, path: Path) -> None:
-        """Opens the file, or makes it.
+        """Opens the file; makes it if there is none.
 
         Args:
             path: The file.
 
         Raises:
-            CloudReadError: It cannot be opened or is no SQLite file.
+            CloudReadError: It cannot be opened or is not an SQLite file.
         """
         self.path = path
         try:
@@ -55,7 +55,7 @@ class MapStore:
             self._db.executescript(SCHEMA)
         except sqlite3.Error as error:
             raise CloudReadError(
-                f"{path}: no map file: {error}.", code="PNT-MAP-005"
+                f"{path}: is not a map file: {error}.", code="PNT-MAP-005"
             ) from error
 
     def __enter__(self) -> Self:
@@ -69,7 +69,7 @@ class MapStore:
         self._db.close()
 
     def start(self, intrinsics: CameraIntrinsics, config: MapperConfig) -> None:
-        """Notes camera and settings.
+        """Stores camera and settings.
 
         Raises:
             CloudReadError: The file is of another camera.
@@ -77,7 +77,8 @@ class MapStore:
         known = self.intrinsics
         if known is not None and known != intrinsics:
             raise CloudReadError(
-                f"{self.path}: was made with another camera, {known}.",
+                f"{self.path}: was made with another camera, {known}, "
+                f"not {intrinsics}; give the session a file of its own.",
                 code="PNT-MAP-006",
             )
         with self._db:
@@ -105,9 +106,9 @@ class MapStore:
         number: int,
         frame: Frame,
         X_WC: RigidTransform,
-        links: list[PoseConstraint],
+        constraints: list[PoseConstraint],
     ) -> None:
-        """Keeps a keyframe with its pictures and its links to older ones."""
+        """Stores a keyframe with its pictures and its constraints to older ones."""
         with self._db:
             self._db.execute(
                 "INSERT OR REPLACE INTO keyframes VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -126,14 +127,14 @@ class MapStore:
                 "INSERT INTO links VALUES (?, ?, ?, ?, ?, ?)",
                 [
                     (
-                        link.i,
-                        link.j,
-                        str(link.kind),
-                        link.inliers,
-                        _bytes(link.X_ij),
-                        link.information.tobytes(),
+                        constraint.i,
+                        constraint.j,
+                        str(constraint.kind),
+                        constraint.inliers,
+                        _bytes(constraint.X_ij),
+                        constraint.information.tobytes(),
                     )
-                    for link in links
+                    for constraint in constraints
                 ],
             )
 
@@ -144,7 +145,7 @@ class MapStore:
         outcome: str,
         placed: tuple[int, RigidTransform] | None,
     ) -> None:
-        """Notes what became of a frame: last keyframe and X_KC if it has a pose."""
+        """Stores a frame's outcome, and last keyframe and X_KC if it has a pose."""
         k, pose = (None, None) if placed is None else (placed[0], _bytes(placed[1]))
         with self._db:
             self._db.execute(
@@ -164,7 +165,7 @@ class MapStore:
     def save_answer(
         self, poses: Sequence[RigidTransform], seconds: Sequence[float]
     ) -> None:
-        """Keeps the optimised poses and the CPU time of the keyframes."""
+        """Stores the optimised poses and the CPU time of the keyframes."""
         with self._db:
             self._db.executemany(
                 "UPDATE keyframes SET pose = ? WHERE k = ?",
@@ -178,7 +179,7 @@ class MapStore:
     def keyframes(
         self,
     ) -> Iterator[tuple[int, Frame, RigidTransform, list[PoseConstraint]]]:
-        """Reads the keyframes: number of the frame, the frame, its pose and links."""
+        """Reads the keyframes: frame number, frame, X_WC and constraints."""
         rows = self._db.execute(
             "SELECT k, number, time, depth, color, arm, pose FROM keyframes ORDER BY k"
         )
@@ -229,7 +230,7 @@ def _pose(data: bytes) -> RigidTransform:
 
 
 def _png(image: npt.NDArray[Any]) -> bytes:
-    # The quickest setting: half the time for a tenth more bytes.
+    # The fastest setting: half the time for a tenth more bytes.
     _, data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     return data.tobytes()
 
@@ -238,6 +239,7 @@ def _picture(data: bytes, mode: int) -> npt.NDArray[Any]:
     image = cv2.imdecode(np.frombuffer(data, np.uint8), mode)
     if image is None:
         raise CloudReadError(
-            "a picture in the map file is damaged.", code="PNT-MAP-007"
+            "a picture in the map file is damaged; map the recording again.",
+            code="PNT-MAP-007",
         )
     return np.asarray(image)

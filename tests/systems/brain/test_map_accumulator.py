@@ -96,7 +96,7 @@ def test_each_picture_keeps_the_pose_it_was_taken_at():
         bench.simulator.AdvanceTo(0.4 * number + 0.3)
     pictures = bench.context.get_abstract_state(0).get_value().map.pictures
     for picture, pose in zip(pictures, (X_WC, beside), strict=True):
-        assert picture.X_arm.IsExactlyEqualTo(pose)
+        assert picture.X_WN.IsExactlyEqualTo(pose)
 
 
 def test_nothing_is_fused_while_not_enabled():

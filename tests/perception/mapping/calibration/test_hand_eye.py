@@ -105,13 +105,13 @@ def test_a_board_shows_all_of_the_mount():
 
 def test_too_few_pictures_are_refused(intrinsics):
     frames = list(wall_frames(intrinsics, 7, (10.0, 10.0)))
-    with pytest.raises(CalibrationError, match="7 pictures have a pose"):
+    with pytest.raises(CalibrationError, match="7 pictures have a pose by the arm"):
         calibrate_on_wall(frames, intrinsics)
     with pytest.raises(CalibrationError, match="0 pictures show the board"):
         calibrate_on_board(frames, intrinsics, BoardConfig())
 
 
-def test_boards_that_cannot_be_are_refused():
+def test_invalid_boards_are_refused():
     with pytest.raises(ValueError, match=r"board\.columns must be >= 3"):
         BoardConfig(columns=2).validate()
     with pytest.raises(ValueError, match=r"board\.marker must be > 0 and below"):

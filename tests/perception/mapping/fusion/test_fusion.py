@@ -46,27 +46,27 @@ def test_variance_counts_and_colours_are_those_of_the_pixels(intrinsics):
     assert 0.8 * pixels < fused.counts.sum() <= pixels
 
 
-def test_what_was_there_once_is_erased_by_later_frames(intrinsics):
-    ghost = flat(intrinsics, 700)
-    ghost[60:180, 150:270] = 500
-    fused = fused_of(intrinsics, [ghost, ghost, *[flat(intrinsics, 700)] * 7])
+def test_later_frames_carve_what_they_see_through(intrinsics):
+    outlier = flat(intrinsics, 700)
+    outlier[60:180, 150:270] = 500
+    fused = fused_of(intrinsics, [outlier, outlier, *[flat(intrinsics, 700)] * 7])
     assert fused.carved > 100
     assert fused.p_WQs[2].min() > 0.69
-    kept = fused_of(intrinsics, [ghost] * 4)  # What is always there stays.
+    kept = fused_of(intrinsics, [outlier] * 4)  # A permanent surface stays.
     assert kept.p_WQs[2].min() < 0.51
 
 
-def test_what_one_frame_of_ten_saw_beside_a_surface_is_a_ghost(intrinsics):
-    hole, ghost = flat(intrinsics, 700), flat(intrinsics, 700)
-    # A voxel is 7 pixels wide; nothing else is seen where the ghost is.
-    hole[100:107, 200:207], ghost[100:107, 200:207] = 0, 685
-    with_hole, with_ghost = (
+def test_a_voxel_that_one_frame_of_ten_saw_beside_a_surface_is_an_outlier(intrinsics):
+    hole, outlier = flat(intrinsics, 700), flat(intrinsics, 700)
+    # A voxel is 7 pixels wide; nothing else is seen at the outlier.
+    hole[100:107, 200:207], outlier[100:107, 200:207] = 0, 685
+    with_hole, with_outlier = (
         keyframe_of(intrinsics, 0, picture).replace(source=all_of(picture))
-        for picture in (hole, ghost)
+        for picture in (hole, outlier)
     )
 
     def nearest(count):
-        keyframes = [with_ghost] * count + [with_hole] * (10 - count)
+        keyframes = [with_outlier] * count + [with_hole] * (10 - count)
         poses = [RigidTransform()] * 10
         return fuse(keyframes, poses, X_WV, intrinsics, CONFIG).p_WQs[2].min()
 

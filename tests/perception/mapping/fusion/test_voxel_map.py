@@ -64,7 +64,7 @@ def test_points_outside_the_box_are_left_out():
     assert dut.fuse(in_W(inside + outside), p_WC).counts.sum() == len(inside)
 
 
-def test_a_map_of_nothing_gives_out_nothing():
+def test_an_empty_map_has_an_empty_surface():
     for dut in (make_map(), make_map().fuse(np.zeros((3, 0)), p_WC)):
         assert isinstance(dut.surface_map, SurfaceMap)
         assert dut.surface_map.p_WQs.shape == (3, 0)
@@ -87,18 +87,18 @@ def test_two_surfaces_10_mm_apart_in_one_column_stay_apart():
     np.testing.assert_allclose(np.sort(1.05 - surface.p_WQs[0]), [0.002, 0.012])
 
 
-def test_voxels_seen_much_less_than_those_around_are_ghosts():
+def test_voxels_seen_much_less_than_their_neighbours_are_outliers():
     wall = np.full((3, 20), 0.5012)
     wall[2] = 0.0
-    ghost = np.array([[0.5062], [0.5012], [0.1]])  # The next column.
+    outlier = np.array([[0.5062], [0.5012], [0.1]])  # The next column.
     dut = make_map(min_count=1, outlier_share=0.15)
     for frame in range(10):
-        points = np.hstack([wall, ghost]) if frame == 0 else wall
+        points = np.hstack([wall, outlier]) if frame == 0 else wall
         dut = dut.fuse(X_WT @ points, p_WC)
     assert dut.surface_map.counts.tolist() == [200]
     seen_again = dut
     for _ in range(3):
-        seen_again = seen_again.fuse(X_WT @ np.repeat(ghost, 20, axis=1), p_WC)
+        seen_again = seen_again.fuse(X_WT @ np.repeat(outlier, 20, axis=1), p_WC)
     assert seen_again.surface_map.counts.tolist() == [200, 61]
 
 

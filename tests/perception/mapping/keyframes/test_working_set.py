@@ -57,14 +57,14 @@ def assert_equal(view, other):
 
 @pytest.fixture
 def sizes(monkeypatch):
-    """Unknown poses, keyframes and links of everything that is solved."""
+    """Unknown poses, keyframes and constraints of everything that is solved."""
     seen = []
 
     class Spy(keyframe_graph.Graph):
         def __init__(self, problem, config):
             held = 0 if problem.settled is None else problem.settled.keyframes.sum()
             count = len(problem.X_WC)
-            seen.append((count - held, count, len(problem.links)))
+            seen.append((count - held, count, len(problem.constraints)))
             super().__init__(problem, config)
 
     monkeypatch.setattr(keyframe_graph, "Graph", Spy)
@@ -107,13 +107,13 @@ def test_five_times_the_frames_take_no_more_memory_and_unknowns(sizes):
             traced.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert len(dut.graph.keyframes) == 6 * SIZE
-    assert len(dut.graph.links) > 3 * SIZE
-    # Poses, planes and links stay: some 7 kB a keyframe of this camera.
+    assert len(dut.graph.constraints) > 3 * SIZE
+    # Poses, planes and constraints stay: some 7 kB a keyframe of this camera.
     view = dut.graph.keyframes[-1].source.view()
     assert (traced[-1] - traced[1]) / (4 * SIZE) < 10e3 < 0.5 * len(view.packed())
-    members, keyframes, links = np.max(sizes, axis=0)
+    members, keyframes, constraints = np.max(sizes, axis=0)
     assert members <= SIZE
-    assert links <= SIZE * CONFIG.max_links
+    assert constraints <= SIZE * CONFIG.max_links
     assert keyframes <= SIZE * (1 + CONFIG.max_links)
     # The last answer is of all.
     dut.finish()
@@ -128,5 +128,5 @@ def test_short_sequences_are_solved_as_without_a_bound(blank_scan, intrinsics):
             dut.add(frame)
         poses.append([X.GetAsMatrix34() for _, X in dut.finish().poses])
         assert len(dut.graph.keyframes) > 3 * 3
-    # Links are looked for from slightly other guesses; the last answer is of all.
+    # Constraints are looked for from slightly other guesses; the last answer is of all.
     np.testing.assert_allclose(poses[0], poses[1], atol=1e-4)

@@ -4,8 +4,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from perception.mapping.config import MapperConfig
 from perception.mapping.keyframes.keyframe import PlaneSight
+from perception.mapping.pose_graph.constraints import ConstraintKind, PoseConstraint
 from perception.mapping.pose_graph.graph import Graph, Problem, Settled, Sighting
-from perception.mapping.pose_graph.links import ConstraintKind, PoseConstraint
 from perception.mapping.pose_graph.observability import observed_directions
 from perception.mapping.pose_graph.poses import Poses
 
@@ -24,7 +24,7 @@ def true_poses():
     ]
 
 
-def exact_links(poses, steps=(1, 2, 3)):
+def exact_constraints(poses, steps=(1, 2, 3)):
     return [
         PoseConstraint(
             i,
@@ -39,13 +39,13 @@ def exact_links(poses, steps=(1, 2, 3)):
     ]
 
 
-def problem_of(start, arm, links, sightings=(), planes=()):
+def problem_of(start, arm, constraints, sightings=(), planes=()):
     known = arm is not None
     return Problem(
         X_WC=Poses.of(start),
-        X_arm=Poses.of(arm if known else start),
+        X_WN=Poses.of(arm if known else start),
         has_arm=np.full(COUNT, known),
-        links=list(links),
+        constraints=list(constraints),
         sightings=list(sightings),
         planes=np.array(planes, dtype=float).reshape(-1, 4),
         numbers=np.arange(COUNT),
@@ -69,20 +69,24 @@ def test_exact_links_lead_from_a_bad_start_to_the_truth():
     rng = np.random.default_rng(1)
     bad = Poses.of(truth).moved(0.01 * rng.standard_normal((COUNT, 6)))
     start = [truth[0], *bad.list()[1:]]
-    estimate = Graph(problem_of(start, None, exact_links(truth)), CONFIG).optimize()
+    estimate = Graph(
+        problem_of(start, None, exact_constraints(truth)), CONFIG
+    ).optimize()
     assert distances(estimate.X_WC, truth).max() < 1e-6
 
 
 def test_wrong_links_are_dropped_one_by_one():
     truth = true_poses()
-    links = exact_links(truth)
+    constraints = exact_constraints(truth)
     rng = np.random.default_rng(2)
-    wrong = rng.choice(len(links), len(links) // 10, replace=False)
+    wrong = rng.choice(len(constraints), len(constraints) // 10, replace=False)
     for index in wrong:
         step = RigidTransform(RollPitchYaw(0.0, 0.03, 0.02), [0.03, -0.02, 0.01])
-        links[index] = links[index].replace(X_ij=links[index].X_ij @ step)
-    estimate = Graph(problem_of(truth, None, links), CONFIG).optimize()
-    assert set(np.flatnonzero(estimate.link_weights == 0.0)) == set(wrong)
+        constraints[index] = constraints[index].replace(
+            X_ij=constraints[index].X_ij @ step
+        )
+    estimate = Graph(problem_of(truth, None, constraints), CONFIG).optimize()
+    assert set(np.flatnonzero(estimate.constraint_weights == 0.0)) == set(wrong)
     assert distances(estimate.X_WC, truth).max() < 1e-4
 
 
@@ -91,11 +95,11 @@ def test_a_shift_of_the_base_is_found_by_links():
     X_shift = RigidTransform([0.003, -0.002, 0.004])
     arm = list(truth)
     arm[COUNT // 2 :] = [X_shift.inverse() @ X for X in arm[COUNT // 2 :]]
-    estimate = Graph(problem_of(arm, arm, exact_links(truth)), CONFIG).optimize()
+    estimate = Graph(problem_of(arm, arm, exact_constraints(truth)), CONFIG).optimize()
     moved = estimate.base.p[-1] - estimate.base.p[0]
     np.testing.assert_allclose(moved, X_shift.translation(), atol=1e-3)
     away = [X.inverse() @ Y for X, Y in zip(estimate.X_WC.list(), truth, strict=True)]
-    # Of 5.4 mm; the links' own 0.2 mm share what is left at the step.
+    # Of 5.4 mm; the constraints' own 0.2 mm share what is left at the step.
     assert np.ptp([X.translation() for X in away], axis=0).max() < 1e-3
 
 
@@ -103,7 +107,7 @@ def test_the_mounts_rotation_is_found_and_its_translation_held():
     truth = true_poses()
     X_mount = RigidTransform(RollPitchYaw(0.002, -0.003, 0.004), [0.0, 0.0, 0.0])
     arm = [X @ X_mount.inverse() for X in truth]
-    estimate = Graph(problem_of(arm, arm, exact_links(truth)), CONFIG).optimize()
+    estimate = Graph(problem_of(arm, arm, exact_constraints(truth)), CONFIG).optimize()
     turn = Poses.identity(1).steps_to(Poses.of([X_mount]))[0, :3]
     # The path's 2 m and the arm's 1 mm give 0.03 deg across it, less about it.
     np.testing.assert_allclose(estimate.mount[1:3], turn[1:], atol=1e-3)

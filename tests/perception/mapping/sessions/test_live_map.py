@@ -40,8 +40,8 @@ def places():
 
 def scanned(mount):
     dut = LiveMap.empty(X_WT, SIZE, CONFIG, CAMERA, PoseGraphConfig())
-    for time, X_arm in enumerate(places()):
-        dut = dut.fused(float(time), depth_of_wall(X_arm @ mount), X_arm)
+    for time, X_WN in enumerate(places()):
+        dut = dut.fused(float(time), depth_of_wall(X_WN @ mount), X_WN)
     return dut
 
 
@@ -94,13 +94,13 @@ def test_what_a_bare_wall_cannot_show_stays_as_the_arm_has_it(tilted):
 def test_a_restart_keeps_what_was_learned(tilted):
     dut = tilted.restarted(X_WS)
     assert dut.surface_map.frames == 0
-    assert dut.X_CCm.IsExactlyEqualTo(tilted.solution.mount)
-    for time, X_arm in enumerate(places()):
-        dut = dut.fused(100.0 + time, depth_of_wall(X_arm @ MOUNT), X_arm)
+    assert dut.X_NC.IsExactlyEqualTo(tilted.solution.mount)
+    for time, X_WN in enumerate(places()):
+        dut = dut.fused(100.0 + time, depth_of_wall(X_WN @ MOUNT), X_WN)
     assert not dut.is_moved  # So nothing is fused twice.
     assert np.abs(wall_in_S(dut.surface_map)[0]).max() < 0.02
     good = scanned(RigidTransform()).restarted(X_WS)
-    assert good.X_CCm.IsExactlyIdentity()
+    assert good.X_NC.IsExactlyIdentity()
 
 
 def test_few_pictures_become_keyframes(tilted):
@@ -117,16 +117,16 @@ def test_a_picture_of_another_size_is_refused(tilted):
 def test_pictures_without_depth_are_no_surface_and_no_error():
     dut = LiveMap.empty(X_WT, SIZE, CONFIG, CAMERA, PoseGraphConfig())
     nothing = np.zeros((CAMERA.height, CAMERA.width), np.uint16)
-    for time, X_arm in enumerate(places()[:3]):
-        dut = dut.fused(float(time), nothing, X_arm)
+    for time, X_WN in enumerate(places()[:3]):
+        dut = dut.fused(float(time), nothing, X_WN)
     assert dut.surface_map.p_WQs.shape == (3, 0)
     assert dut.surface_map.mount_tilt == 0.0
     assert not dut.is_moved
 
 
 def test_one_view_tells_nothing_of_the_mount():
-    X_arm = places()[0]
+    X_WN = places()[0]
     dut = LiveMap.empty(X_WT, SIZE, CONFIG, CAMERA, PoseGraphConfig())
-    dut = dut.fused(0.0, depth_of_wall(X_arm @ MOUNT), X_arm)
+    dut = dut.fused(0.0, depth_of_wall(X_WN @ MOUNT), X_WN)
     assert not dut.is_moved
     assert dut.surface_map.mount_tilt == pytest.approx(0.0, abs=1e-6)

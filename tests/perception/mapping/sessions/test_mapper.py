@@ -120,7 +120,7 @@ def test_a_camera_of_another_focal_length_is_refused(textured_scan, intrinsics):
 
 
 def test_no_frame_is_no_map(intrinsics):
-    with pytest.raises(NoMapError, match="there is none"):
+    with pytest.raises(NoMapError, match="sequence is empty"):
         Mapper(intrinsics, MapperConfig()).finish()
 
 

@@ -24,11 +24,11 @@ def test_a_broken_session_goes_on_to_the_same_map(blank_scan, intrinsics, tmp_pa
         store.start(intrinsics, CONFIG)
         with pytest.raises(KeyboardInterrupt):
             run_session(Mapper(intrinsics, CONFIG), breaking(frames, 11), store)
-    looked_at = []
+    shown = []
     with MapStore(tmp_path / "map.db") as store:
         kept = len(store)
         dut = Mapper(intrinsics, CONFIG)
-        result = run_session(dut, frames, store, looked_at.append)
+        result = run_session(dut, frames, store, shown.append)
         assert len(store) == len(dut.graph.keyframes) > kept > 2
     assert len(result.poses) == len(whole.poses) == len(frames)
     assert sum(dut.outcomes.values()) == len(frames)
@@ -48,9 +48,9 @@ def test_pictures_and_links_come_back_as_they_were(textured_scan, intrinsics, tm
     with MapStore(tmp_path / "map.db") as store:
         assert (store.intrinsics, store.config) == (intrinsics, CONFIG)
         rows = list(store.keyframes())
-    links = [link for row in rows for link in row[3]]
-    assert len(links) == len(dut.graph.links) > 0
-    for old, new in zip(dut.graph.links, links, strict=True):
+    constraints = [constraint for row in rows for constraint in row[3]]
+    assert len(constraints) == len(dut.graph.constraints) > 0
+    for old, new in zip(dut.graph.constraints, constraints, strict=True):
         assert (new.i, new.j, new.kind, new.inliers) == (
             old.i,
             old.j,
@@ -66,7 +66,7 @@ def test_pictures_and_links_come_back_as_they_were(textured_scan, intrinsics, tm
 
 def test_files_that_are_none_of_ours_are_refused(intrinsics, tmp_path):
     (tmp_path / "text.db").write_text("no database, but long enough to be read as one")
-    with pytest.raises(CloudReadError, match=r"text\.db: no map file"):
+    with pytest.raises(CloudReadError, match=r"text\.db: is not a map file"):
         MapStore(tmp_path / "text.db")
     with MapStore(tmp_path / "map.db") as store:
         store.start(intrinsics, CONFIG)

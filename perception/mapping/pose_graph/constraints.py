@@ -1,4 +1,4 @@
-"""Links between two keyframes, by appearance or geometry, and what they observe."""
+"""Constraints between two keyframes, from appearance or geometry."""
 
 import enum
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ _LEVER = 0.4
 """Length that makes rotations comparable to displacements, m: half a view."""
 _COMPLEXITY = 0.04
 """Directions along which normals give less than this share of the strongest
-information are not observed. RTAB-Map's `Icp/PointToPlaneMinComplexity` is 0.02; what a
-D435 sees of a window's edges passes that, and moves the camera along the wall."""
+information are not observed. RTAB-Map's `Icp/PointToPlaneMinComplexity` is 0.02; the
+edges of a window in a D435's depth pass that and move the camera along the wall."""
 _NUMERICAL = 1e-6
-"""Directions under this share of the strongest are zero but for rounding."""
+"""Directions below this share of the strongest are rounding errors."""
 _ICP_ROUNDS = 6
 _ICP_GATE = 0.03
 _ICP_POINTS = 3000
 _RATIO = 0.85
-"""Lowe's: the best match is so much better than the second."""
+"""Lowe's ratio test: distance of the best match over that of the second."""
 
 
 class ConstraintKind(enum.StrEnum):
-    """How a link was found."""
+    """How a constraint was measured."""
 
     APPEARANCE = "appearance"
     GEOMETRY = "geometry"
@@ -44,11 +44,11 @@ class PoseConstraint(FrozenValue):
     Attributes:
         i: Index of the older keyframe.
         j: Index of the newer one.
-        kind: How it was found.
+        kind: How it was measured.
         X_ij: Measured pose.
-        information: (6, 6), of a step of X_ij (see `Poses`); singular where the link
-            observes nothing.
-        inliers: Matches or points it rests on.
+        information: (6, 6), of a step of X_ij (see `Poses`); zero along directions that
+            are not observed.
+        inliers: Matches or points used.
     """
 
     i: int
@@ -67,7 +67,7 @@ class PoseConstraint(FrozenValue):
 def floored(
     information: FloatArray, config: PoseGraphConfig, complexity: float = 0.0
 ) -> FloatArray:
-    """Keeps information honest: no direction is better than the link's floor.
+    """Limits information: no direction is better than the sigmas of a constraint.
 
     Args:
         information: (6, 6) of rotation and displacement.
@@ -102,7 +102,7 @@ def constraint_by_appearance(
         ends: Indices of the two keyframes.
 
     Returns:
-        The link, or None if too few matches agree, and how many do.
+        The constraint, or None if too few matches agree, and the number of inliers.
     """
     if min(len(a.uv), len(b.uv)) < config.min_inliers:
         return None, min(len(a.uv), len(b.uv))
@@ -134,10 +134,10 @@ def constraint_by_appearance(
     X_ij, information = _refine(
         X_ji.inverse(), a, b, first[kept], second[kept], intrinsics, config
     )
-    link = PoseConstraint(
+    constraint = PoseConstraint(
         *ends, ConstraintKind.APPEARANCE, X_ij, floored(information, config), count
     )
-    return link, count
+    return constraint, count
 
 
 def _refine(
@@ -201,7 +201,7 @@ def constraint_by_geometry(
     config: PoseGraphConfig,
     ends: tuple[int, int],
 ) -> PoseConstraint | None:
-    """Registers points to planes, along the directions that the normals determine.
+    """Registers points to planes along the directions that the normals determine.
 
     Source: Chen and Medioni, "Object modelling by registration of multiple range
     images", 1992 (point to plane); Zhang et al., "On degeneracy of optimization-based
@@ -210,13 +210,13 @@ def constraint_by_geometry(
     Args:
         a: Grid of the older keyframe.
         b: Of the newer one.
-        X_ij: First guess; what is not determined stays as it is in it.
+        X_ij: First guess; directions that are not determined keep its value.
         intrinsics: Of the camera.
-        config: The link's floor is used.
+        config: `link_sigma` and `link_sigma_deg` are used.
         ends: Indices of the two keyframes.
 
     Returns:
-        The link, or None if the two share too little.
+        The constraint, or None if the two overlap too little.
     """
     points = b.points[b.valid]
     points = points[:: max(1, len(points) // _ICP_POINTS)]
@@ -230,7 +230,7 @@ def constraint_by_geometry(
         if count < max(100, len(points) // 10):
             return None
         p_j, n_j, e = found
-        # About the points' centre, where turning and moving are told apart best.
+        # About the points' centre, which decouples rotation and translation best.
         center = p_j.mean(axis=0)
         to_center[3:, :3] = -skew(center)
         scale[:3] = np.sqrt(np.mean(np.sum((p_j - center) ** 2, axis=1)))
@@ -239,12 +239,12 @@ def constraint_by_geometry(
         information = rows.T @ (rows * weight[:, None])
         values, axes = np.linalg.eigh(information)
         kept = axes[:, values > _COMPLEXITY * values[-1]]
-        # The shortest step of the camera that does what the kept directions ask for.
-        wanted = kept.T * scale @ to_center / scale
-        asked = np.linalg.solve(
+        # The shortest step of the camera that solves the kept directions.
+        to_kept = kept.T * scale @ to_center / scale
+        kept_step = np.linalg.solve(
             kept.T @ information @ kept, kept.T @ (rows.T @ (e * weight))
         )
-        step = -np.linalg.pinv(wanted) @ asked / scale
+        step = -np.linalg.pinv(to_kept) @ kept_step / scale
         rms = float(np.sqrt(np.average(e**2, weights=weight)))
         turn = RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix())
         X_ij = X_ij @ RigidTransform(turn, step[3:])
@@ -253,14 +253,14 @@ def constraint_by_geometry(
     # A quarter of the points are independent, as for planes.
     determined = kept @ kept.T @ information @ kept @ kept.T
     information = determined * np.outer(scale, scale) / (4.0 * max(rms, 5e-4) ** 2)
-    honest = to_center.T @ floored(information, config, _NUMERICAL) @ to_center
-    return PoseConstraint(*ends, ConstraintKind.GEOMETRY, X_ij, honest, count)
+    limited = to_center.T @ floored(information, config, _NUMERICAL) @ to_center
+    return PoseConstraint(*ends, ConstraintKind.GEOMETRY, X_ij, limited, count)
 
 
 def _correspond(
     a: PointGrid, points: FloatArray, X_ij: RigidTransform, intrinsics: CameraIntrinsics
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Finds for points of j those of i on the same ray.
+    """Finds the point of i on the same ray as each point of j.
 
     Returns:
         p_Cjs (n, 3), normals of the other points (n, 3) in j, and distances along them.

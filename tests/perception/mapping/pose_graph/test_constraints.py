@@ -5,7 +5,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from perception.mapping.config import MapperConfig
 from perception.mapping.keyframes import keyframe
 from perception.mapping.keyframes.keyframe import find_features
-from perception.mapping.pose_graph.links import (
+from perception.mapping.pose_graph.constraints import (
     constraint_by_appearance,
     constraint_by_geometry,
     floored,
@@ -42,9 +42,9 @@ OFFSET = RigidTransform(RollPitchYaw(0.004, -0.006, 0.003), [0.004, -0.003, 0.00
 def test_a_corner_determines_all_directions(intrinsics):
     X_ij = RigidTransform(RollPitchYaw(0.02, 0.03, -0.01), [0.05, 0.02, 0.01])
     a, b = (grid_of(intrinsics, CORNER, X) for X in (RigidTransform(), X_ij))
-    link = constraint_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
-    assert link.rank == 6
-    off = X_ij.inverse() @ link.X_ij
+    constraint = constraint_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
+    assert constraint.rank == 6
+    off = X_ij.inverse() @ constraint.X_ij
     # Depth is rounded to whole mm, and the grid's points are the mean of 64 pixels.
     assert np.linalg.norm(off.translation()) < 1e-3
     assert off.rotation().ToAngleAxis().angle() < 1.5e-3
@@ -53,9 +53,9 @@ def test_a_corner_determines_all_directions(intrinsics):
 def test_a_wall_corrects_distance_and_tilt_and_leaves_the_rest(intrinsics):
     X_ij = RigidTransform([0.05, 0.02, 0.01])
     a, b = (grid_of(intrinsics, WALL, X) for X in (RigidTransform(), X_ij))
-    link = constraint_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
-    assert link.rank == 3
-    off = X_ij.inverse() @ link.X_ij
+    constraint = constraint_by_geometry(a, b, X_ij @ OFFSET, intrinsics, CONFIG, (0, 1))
+    assert constraint.rank == 3
+    off = X_ij.inverse() @ constraint.X_ij
     assert off.translation()[2] == pytest.approx(0.0, abs=3e-4)
     np.testing.assert_allclose(
         off.translation()[:2], OFFSET.translation()[:2], atol=2e-4
@@ -86,8 +86,8 @@ def test_information_never_passes_its_floor():
 def test_texture_gives_the_pose_between_two_frames(textured_scan, intrinsics):
     (a, X_Wa), (b, X_Wb) = textured_scan[0], textured_scan[2]
     seen = [find_features(frame, intrinsics, CONFIG) for frame in (a, b)]
-    link, inliers = constraint_by_appearance(*seen, intrinsics, CONFIG, (0, 1))
-    off = (X_Wa.inverse() @ X_Wb).inverse() @ link.X_ij
+    constraint, inliers = constraint_by_appearance(*seen, intrinsics, CONFIG, (0, 1))
+    off = (X_Wa.inverse() @ X_Wb).inverse() @ constraint.X_ij
     assert inliers > 50
     # Tilt and displacement of a plane are told apart by depth alone, pixel by pixel.
     assert np.linalg.norm(off.translation()) < 3e-3
