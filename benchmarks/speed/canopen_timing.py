@@ -3,9 +3,9 @@
 Run `python -m benchmarks.speed.canopen_timing`; SCHED_FIFO needs root or RLIMIT_RTPRIO,
 else the loop warns and the figures are those of a plain thread. Five drives and the I/O
 node at 200 Hz over a local socket, once alone and once while another process segments a
-wall of 500,000 points and plans its strokes, over and over. Compare figures within one
-run only: before each a loop that does nothing but wait says what the computer itself is
-late by, which on a virtual machine is its host's doing.
+wall of 500,000 points and plans its strokes repeatedly. Compare figures within one run
+only: before each measurement a loop that only waits shows how late the computer itself
+is; on a virtual machine that comes from its host.
 """
 
 import dataclasses
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def print_bare() -> None:
-    """Prints how late a loop is that does nothing, in a process of its own."""
+    """Prints the lateness of a loop that only waits, in a process of its own."""
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=wait_only)
     process.start()
@@ -62,7 +62,7 @@ def print_bare() -> None:
 
 
 def wait_only() -> None:
-    """Waits for ticks as the bus process does, and prints how late they were."""
+    """Waits for ticks as the bus process does, and prints their lateness."""
     kind = "FIFO" if use_fifo() else "plain"
     lock_memory()
     ticker = Ticker(PERIOD)
@@ -81,7 +81,7 @@ def wait_only() -> None:
 
 
 def print_row(report: Report, log: Path, *, busy: bool) -> None:
-    """Prints the figures of a run: by the loop, and by the log of what was sent."""
+    """Prints the figures of a run: by the loop, and by the log of sent frames."""
     late, counts = report.lateness, report.feedback.statistics
     assert late is not None
     name = "segmenting" if busy else "alone"
@@ -98,15 +98,15 @@ def print_row(report: Report, log: Path, *, busy: bool) -> None:
 
 
 def lateness_of(log: Path) -> tuple[float, ...]:
-    """Returns p50, p99, p99.9 and worst of when SYNCs had left, s.
+    """Returns p50, p99, p99.9 and maximum lateness of sent SYNCs, s.
 
-    Beside the period's grid that hardly any SYNC is earlier than, without the first
-    second.
+    The reference is a grid of periods at the first percentile of the SYNCs; the first
+    second is left out.
     """
     times = [r.time for r in read_log(log) if r.frame.cob_id == SYNC_ID]
     sent = np.array(times) - times[0]
     sent = sent[sent > 1.0]
-    # Up to three quarters of a period may be told as late, beside what is usual.
+    # Lateness of up to three quarters of a period above the median is unambiguous.
     usual = np.median(sent % PERIOD)
     late = (sent - usual + PERIOD / 4.0) % PERIOD
     late -= np.percentile(late, 1)
@@ -126,8 +126,8 @@ def measure(*, busy: bool, log: Path) -> Report:
         bus = load_bus(models_path("bus", "painter.bus.yaml"))
         channel = str(Path(folder) / "can")
         bus = dataclasses.replace(bus, interface="local", channel=channel)
-        # What is late is counted here, and must not end the run: simulated drives share
-        # the cores, real ones do not.
+        # Late frames are counted and must not end the run: simulated drives share the
+        # cores, real ones do not.
         bus.timeouts = dataclasses.replace(bus.timeouts, tpdo=1.0, rpdo_cycles=200)
         bus.io = dataclasses.replace(bus.io, deadline=1.0)
         context = multiprocessing.get_context("spawn")
@@ -179,7 +179,7 @@ def stream(bus: BusConfig, log: Path) -> Report:
 
 
 def run_drives(bus: BusConfig, done: Event) -> None:
-    """Runs the simulated drives; like real ones, they wait for no other program."""
+    """Runs the simulated drives under SCHED_FIFO: real ones wait for no program."""
     use_fifo(50)
     server = RackServer(bus)
     server.run(lambda now: done.is_set())
@@ -190,7 +190,7 @@ def run_drives(bus: BusConfig, done: Event) -> None:
 
 
 def work(working: Event, done: Event) -> None:
-    """Segments and plans, as the diagram does beside the bus; says how often."""
+    """Segments and plans, as the diagram does beside the bus; prints how often."""
     wall = furnished_wall(POINTS, seed=1)
     scenario = load_scenario("cubes")
     planner, truth = MakeProgramPlanner(scenario), true_segmentation(scenario)
