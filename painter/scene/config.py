@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from perception.settings import Conflict, setting, validate
+from perception.settings import Conflict, setting
 
 # Numbers that describe the size of an object of each shape.
 OBJECT_SIZES = {
@@ -191,10 +191,6 @@ class Scene:
     objects: list[ObjectConfig] = dataclasses.field(default_factory=list)
     room: RoomConfig = dataclasses.field(default_factory=RoomConfig)
     base_error: BaseErrorConfig = dataclasses.field(default_factory=BaseErrorConfig)
-
-    def validate(self) -> None:
-        """Raises ValueError for the first value out of bounds."""
-        validate(self)
 
     def opening_boxes(self) -> list[list[list[float]]]:
         """Returns corners [x, y] of each opening, m from the wall's lower left one."""

@@ -1,17 +1,16 @@
 """Reading scenes: by name, from a file, or drawn from a seed."""
 
-import dataclasses
-import typing
 from pathlib import Path
-from typing import Any
 
 import yaml
-from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+from pydrake.common.yaml import yaml_dump_typed
 
 from painter.errors import InputError
 from painter.resources import models_path
 from painter.scene.config import Scene
 from painter.scene.random_scene import draw_random_scene
+from painter.typed_yaml import read_typed
+from perception.settings import validate
 
 _SUFFIX = ".scene.yaml"
 
@@ -60,15 +59,11 @@ def load_scene(name: str, seed: int) -> Scene:
             f"{path}: expected one top key, the scene's name.", code="PNT-SCENE-004"
         )
     ((top, fields),) = document.items()
+    if isinstance(fields, dict | None):
+        fields = {"name": str(top)} | (fields or {})
     try:
-        if fields is None:
-            fields = {}
-        _check_types(Scene, fields, "")
-        fields = {"name": str(top)} | fields
-        scene = yaml_load_typed(
-            schema=Scene, data=yaml.safe_dump(fields), defaults=Scene()
-        )
-        scene.validate()
+        scene = read_typed(Scene, fields)
+        validate(scene)
     except ValueError as error:
         raise InputError(f"{path}: {error}", code="PNT-SCENE-005") from error
     return scene
@@ -77,27 +72,3 @@ def load_scene(name: str, seed: int) -> Scene:
 def dump_scene(scene: Scene) -> str:
     """Returns the whole scene as YAML that `load_scene` reads back."""
     return yaml_dump_typed({scene.name: scene}, schema=dict[str, Scene])
-
-
-def _check_types(schema: Any, data: Any, where: str) -> None:
-    """Raises ValueError naming the field where data do not fit; Drake's does not."""
-    if dataclasses.is_dataclass(schema):
-        if not isinstance(data, dict):
-            raise ValueError(f"{where or 'scene'} must have fields, got {data!r}.")
-        known = {field.name: field.type for field in dataclasses.fields(schema)}
-        for key, value in data.items():
-            place = f"{where}.{key}" if where else str(key)
-            if key not in known:
-                raise ValueError(f"{place} is unknown; known are: {', '.join(known)}.")
-            _check_types(known[key], value, place)
-    elif typing.get_origin(schema) is list:
-        if not isinstance(data, list):
-            raise ValueError(f"{where} must be a list, got {data!r}.")
-        (item,) = typing.get_args(schema)
-        for i, value in enumerate(data):
-            _check_types(item, value, f"{where}[{i}]")
-    else:
-        words = {float: "a number", int: "a whole number", str: "a word"}
-        fits = isinstance(data, (int, float) if schema is float else schema)
-        if not fits or isinstance(data, bool):
-            raise ValueError(f"{where} must be {words[schema]}, got {data!r}.")

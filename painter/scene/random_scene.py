@@ -11,6 +11,7 @@ from painter.scene.config import (
     Scene,
     WallConfig,
 )
+from perception.settings import validate
 
 # Least gap between two things on the wall, and between one and the tile's edge, m.
 _GAP = 0.06
@@ -74,7 +75,7 @@ def draw_random_scene(seed: int) -> Scene:
             x=x, y=y, z=z, roll_deg=roll, pitch_deg=pitch, yaw_deg=yaw
         ),
     )
-    scene.validate()
+    validate(scene)
     return scene
 
 

@@ -8,6 +8,7 @@ from painter.scene.config import ObjectConfig, Scene
 from painter.scene.load import dump_scene, load_scene
 from painter.scene.solids import SurfaceKind, scene_solids
 from painter.scene.surface import cast_rays, height_field
+from perception.settings import validate
 
 SEEDS = range(30)
 # Four bytes of a seed are usual; nothing may depend on its being small.
@@ -17,7 +18,7 @@ LARGE_SEED = 2**32 - 1
 @pytest.mark.parametrize("seed", [*SEEDS, LARGE_SEED])
 def test_random_scene_is_valid_and_within_its_promises(seed: int):
     scene = load_scene("random", seed)
-    scene.validate()
+    validate(scene)
     assert len(scene.openings) <= 2
     assert len(scene.objects) <= 6
     error = scene.base_error

@@ -26,6 +26,7 @@ from painter.scene.sdf import scene_sdf, wall_pose
 from painter.scene.solids import SurfaceKind
 from painter.scene.surface import surface_at
 from painter.scene.texture import wall_picture
+from perception.settings import validate
 
 # The nominal tile 1.05 m before the base, its lower edge 0.2 m over the floor.
 X_WT = RigidTransform(
@@ -119,7 +120,7 @@ def test_rendered_depth_of_tilted_bodies_agrees_with_the_truth(tmp_path: Path):
             ObjectConfig(shape="sphere", size=[0.5], position=[1.0, 0.6, 0.0]),
         ]
     )
-    scene.validate()
+    validate(scene)
     errors = compare_depth(scene, tmp_path, "scene")
     # VTK draws cylinders and spheres as polyhedra: 0.25 m (1 - cos(pi/50)) is 0.5 mm,
     # more where the surface is steep.

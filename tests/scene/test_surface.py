@@ -9,6 +9,7 @@ from painter.scene.config import ObjectConfig, OpeningConfig, Scene
 from painter.scene.load import load_scene
 from painter.scene.solids import SurfaceKind
 from painter.scene.surface import height_field, is_paintable, surface_at
+from perception.settings import validate
 
 
 def make_scene(*things: OpeningConfig | ObjectConfig) -> Scene:
@@ -16,7 +17,7 @@ def make_scene(*things: OpeningConfig | ObjectConfig) -> Scene:
         openings=[thing for thing in things if isinstance(thing, OpeningConfig)],
         objects=[thing for thing in things if isinstance(thing, ObjectConfig)],
     )
-    scene.validate()
+    validate(scene)
     return scene
 
 
