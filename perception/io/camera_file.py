@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -16,7 +17,8 @@ from perception.settings import setting, validate
 
 CAMERA_FILE = "camera.json"
 INTRINSICS_FILE = "intrinsics.json"
-_UNDISTORT_ROUNDS = 20
+_UNDISTORTED = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 20, 1e-9)
+"""Ends OpenCV's iteration: after so many rounds, or when it is off by less, px."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,7 +48,12 @@ class RecordedCamera:
         with np.errstate(over="ignore", invalid="ignore"):  # Non-finite: no point.
             z = depth[rows, columns] * self.depth_scale
             x, y = self.intrinsics.rays(columns, rows)
-            x, y = _undistorted(x, y, self.distortion)
+            if any(self.distortion) and rows.size:
+                uv = np.stack([columns, rows], axis=1).astype(np.float64)
+                lens = self.intrinsics.matrix, np.array(self.distortion)
+                x, y = cv2.undistortPointsIter(
+                    uv, *lens, np.eye(3), np.eye(3), _UNDISTORTED
+                )[:, 0].T
             return np.stack([x * z, y * z, z])
 
 
@@ -117,21 +124,3 @@ def write_camera(
     if depth_scale is not None:
         fields["depth_scale_m_per_unit"] = depth_scale
     path.write_text(json.dumps(fields, indent=1) + "\n")
-
-
-def _undistorted(
-    x: FloatArray, y: FloatArray, coefficients: tuple[float, ...]
-) -> tuple[FloatArray, FloatArray]:
-    """Takes the lens distortion off normalised picture coordinates, by iteration."""
-    k1, k2, p1, p2, k3 = coefficients
-    if not any(coefficients):
-        return x, y
-    seen_x, seen_y = x, y
-    for _ in range(_UNDISTORT_ROUNDS):
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        x, y = (
-            (seen_x - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial,
-            (seen_y - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial,
-        )
-    return x, y

@@ -173,6 +173,11 @@ def test_distortion_is_taken_off(tmp_path):
     ("depth", "camera", "message"),
     [
         (np.zeros((3, 4), np.uint16), CAMERA, "no points"),
+        (
+            np.zeros((3, 4), np.uint16),
+            CAMERA | {"distortion_k1k2p1p2k3": [0.1, 0, 0, 0, 0]},
+            "no points",
+        ),
         (np.zeros((3, 4), np.uint8), CAMERA, "expected 16-bit"),
         (np.ones((4, 3), np.uint16), CAMERA, "image is 3 x 4 px, .* is for 4 x 3 px"),
         (
