@@ -4,11 +4,11 @@ Run `python -m benchmarks.findings.edge_bound [--scene terrace]`; the table is p
 
 Beside a straight edge along the strokes the film depends on the place across alone, and
 it is a sum of the fan's profiles, from any place and from any stand-off not below the
-nearest, each with an exposure that is not negative. For a bare strip and a soiled strip
-of given widths, the exposures of least variance are a quadratic programme. The scene's
-bound takes the best widths that keep coverage, keep-out and overspray as they are
-asked. Ends of strokes, corners, the number of strokes, the arm and errors of the mask
-are all taken as free: no plan with this tip does better.
+nearest, each with an exposure that is not negative. For a bare strip and a painted
+keep-out strip of given widths, the exposures of least variance are a quadratic
+programme. The scene's bound takes the best widths that keep coverage, keep-out and
+overspray as required. Ends of strokes, corners, the number of strokes, the arm and the
+mask are ideal: no plan with this tip does better.
 """
 
 import argparse
@@ -29,12 +29,12 @@ from perception.ground import FloatArray
 
 STANDOFFS = (0.12, 0.10, 0.08, 0.06)  # m, nearest of all strokes.
 WIDER = (1.0, 1.5, 2.2)  # Times the nearest: other stand-offs that may be used.
-ASKED = {"coverage": 0.96, "keepout": 0.03, "overspray": 0.05}
+REQUIRED = {"coverage": 0.96, "keepout": 0.03, "overspray": 0.05}
 STEP = 0.0025  # m, of the film ...
 LINE_STEP = 0.005  # m, ... and between lines.
-WALL, BEYOND = 0.40, 0.25  # m, looked at on either side of an edge.
-STRIPS = (0.0, 0.0025, 0.005, 0.0075, 0.01, 0.015)  # m, bare and soiled.
-SPILL_PRICES = (0.0, 0.1, 0.3)  # Variance that a metre of spilt film is worth.
+WALL, BEYOND = 0.40, 0.25  # m, evaluated on either side of an edge.
+STRIPS = (0.0, 0.0025, 0.005, 0.0075, 0.01, 0.015)  # m, bare and painted.
+OVERSPRAY_PRICES = (0.0, 0.1, 0.3)  # Variance that a metre of overspray is worth.
 
 
 class Edge(NamedTuple):
@@ -42,15 +42,15 @@ class Edge(NamedTuple):
 
     Attributes:
         bare: Width of the bare strip, m.
-        soiled: Width of the soiled strip, m.
+        painted: Width of the painted keep-out strip, m.
         variance: Integral of the film's squared deviation from nominal, m.
-        spilt: Paint that lands beyond the edge as width of nominal film, m.
+        overspray: Paint that lands beyond the edge, as width of nominal film, m.
     """
 
     bare: float
-    soiled: float
+    painted: float
     variance: float
-    spilt: float
+    overspray: float
 
 
 def main() -> None:
@@ -62,18 +62,18 @@ def main() -> None:
     edges = edges_of(mask, height)
     sides = float(mask[:, 0].sum() + mask[:, -1].sum()) * CELL
     print(f"{edges}; tile's own edges along the strokes {sides:.2f} m")
-    print(f"least CV with {ASKED}\nnearest      CV   strips beside what stays clean")
+    print(f"least CV with {REQUIRED}\nnearest      CV   strips beside a keep-out")
     for nearest in STANDOFFS:
         inner = best_films(nearest, edges.recess, keepout=True)
         outer = best_films(nearest, 0.0, keepout=False)
         least, best = np.inf, None
         for one, other in itertools.product(inner, outer):
             bare = edges.along * one.bare + sides * other.bare
-            spilt = edges.along * one.spilt + sides * other.spilt
+            overspray = edges.along * one.overspray + sides * other.overspray
             if (
-                bare > (1.0 - ASKED["coverage"]) * edges.wall
-                or edges.along * one.soiled > ASKED["keepout"] * edges.clean
-                or spilt > ASKED["overspray"] * (edges.wall + spilt)
+                bare > (1.0 - REQUIRED["coverage"]) * edges.wall
+                or edges.along * one.painted > REQUIRED["keepout"] * edges.keepout
+                or overspray > REQUIRED["overspray"] * (edges.wall + overspray)
             ):
                 continue
             variance = edges.along * one.variance + sides * other.variance
@@ -84,7 +84,7 @@ def main() -> None:
             continue
         print(
             f"{nearest:7.2f} {100 * np.sqrt(least / edges.wall):6.1f} %   bare "
-            f"{100 * best.bare:.2f} cm, soiled {100 * best.soiled:.2f} cm"
+            f"{100 * best.bare:.2f} cm, painted {100 * best.painted:.2f} cm"
         )
 
 
@@ -93,19 +93,19 @@ def best_films(nearest: float, recess: float, *, keepout: bool) -> list[Edge]:
 
     Args:
         nearest: Least stand-off, m.
-        recess: How far what is beyond the edge lies back, m.
-        keepout: Whether what is beyond is to stay clean.
+        recess: How far the surface beyond the edge lies back, m.
+        keepout: Whether that surface is keep-out.
     """
     wall, beyond = profiles(nearest, recess)
     found = []
-    for bare, soiled, price in itertools.product(
-        STRIPS, STRIPS if keepout else (BEYOND,), SPILL_PRICES
+    for bare, painted, price in itertools.product(
+        STRIPS, STRIPS if keepout else (BEYOND,), OVERSPRAY_PRICES
     ):
-        films = least_variance(wall, beyond, bare, soiled, price)
+        films = least_variance(wall, beyond, bare, painted, price)
         if films is not None:
             variance = float(((films[0] - 1.0) ** 2).sum() * STEP)
-            spilt = float(films[1].sum() * STEP)
-            found.append(Edge(bare, soiled if keepout else 0.0, variance, spilt))
+            overspray = float(films[1].sum() * STEP)
+            found.append(Edge(bare, painted if keepout else 0.0, variance, overspray))
     return found
 
 
@@ -130,7 +130,7 @@ def profiles(nearest: float, recess: float) -> tuple[FloatArray, FloatArray]:
 
 
 def least_variance(
-    wall: FloatArray, beyond: FloatArray, bare: float, soiled: float, price: float
+    wall: FloatArray, beyond: FloatArray, bare: float, painted: float, price: float
 ) -> tuple[FloatArray, FloatArray] | None:
     """Returns the film on the wall and beyond that costs least; None if none can be."""
     count = wall.shape[1]
@@ -144,8 +144,8 @@ def least_variance(
         is_convex=True,
     )
     covered = wall[round(bare / STEP) :]
-    clean = beyond[round(soiled / STEP) :]
-    bounds_of = ((covered, COVERED, np.inf), (clean, -np.inf, OVERSPRAYED))
+    outside = beyond[round(painted / STEP) :]
+    bounds_of = ((covered, COVERED, np.inf), (outside, -np.inf, OVERSPRAYED))
     for rows, low, high in bounds_of:
         if len(rows):
             bounds = (np.full(len(rows), bound) for bound in (low, high))

@@ -1,17 +1,16 @@
-"""What an edge allows: coverage against soiled keep-out, by theory and as planned.
+"""What an edge allows: coverage against painted keep-out, by theory and as planned.
 
 Run `python -m benchmarks.findings.edges --out DIR [--scene terrace]`; DIR gets
 `edges.png` and the table is printed.
 
 By theory: one stroke of a fan with half width a runs beside a straight edge at an
-offset that is free. Wall counts as covered from 80 % of the nominal film, what lies
-beyond the edge as soiled from 10 %; a recess catches thinner film farther in. Along
-edges across the strokes the fan's thickness does the same. Everything else is taken
-as perfect: bare and soiled strips are all there is, no corners, no errors of mask,
-base or arm.
+free offset. Wall counts as covered from `COVERED` of the nominal film, keep-out as
+painted from `OVERSPRAYED`; a recess catches thinner film farther in. Along edges across
+the strokes the fan's thickness does the same. Everything else is ideal: bare and
+painted strips alone, no corners, no errors of mask, base or arm.
 
-As planned: strokes from `plan_strokes` on the exact mask, by `FilmModel`, with soiling
-weighed more and more.
+As planned: strokes from `plan_strokes` on the exact mask, by `FilmModel`, with more and
+more weight on the keep-out.
 """
 
 import argparse
@@ -37,9 +36,9 @@ CELL = 0.01
 TIP = TipConfig()
 STANDOFFS = (0.30, 0.20, 0.10, 0.08, 0.06)  # m, of the strokes beside edges.
 FLOWS = (1.0, 1.25, 1.5)  # Peak of such a stroke's film, as share of nominal.
-# Of soiled cells: half of the planner's own weight, that, and twice as much.
+# Of the keep-out: half of the planner's own weight, that, and twice as much.
 WEIGHTS = tuple(share * film_cost.OPENINGS.keepout for share in (0.5, 1.0, 2.0))
-ASKED = {"terrace": (0.96, 0.03), "room": (0.96, 0.03)}  # Coverage, keepout_paint.
+REQUIRED = {"terrace": (0.96, 0.03), "room": (0.96, 0.03)}  # Coverage, keepout_paint.
 
 
 @dataclass(frozen=True)
@@ -47,17 +46,17 @@ class Edges:
     """Lengths of a scene's edges and its areas; m and m².
 
     Attributes:
-        along: Edges of what stays clean that run along the strokes.
+        along: Edges of keep-outs that run along the strokes.
         across: Those that run across them.
-        wall: To be painted.
-        clean: To stay clean.
-        recess: How far what stays clean lies back.
+        wall: Area to be painted.
+        keepout: Area of keep-outs.
+        recess: How far keep-outs lie back.
     """
 
     along: float
     across: float
     wall: float
-    clean: float
+    keepout: float
     recess: float
 
 
@@ -75,18 +74,18 @@ def main() -> None:
     print(f"{arguments.scene}: {edges}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(7.0, 5.0), layout="constrained")
-    print("\nby theory: least keep-out soiled, %, at a coverage of")
+    print("\nby theory: least keep-out painted, %, at a coverage of")
     shares = (0.94, 0.95, 0.96, 0.97, 0.98)
     print("stand-off  flow " + "".join(f"{share:8.2f}" for share in shares))
     for standoff in STANDOFFS:
         for flow in FLOWS:
-            coverage, soiled = theory(edges, standoff, flow)
-            lowest = [soiled[coverage >= share].min() for share in shares]
+            coverage, painted = theory(edges, standoff, flow)
+            lowest = [painted[coverage >= share].min() for share in shares]
             row = "".join(f"{100 * value:8.1f}" for value in lowest)
             print(f"{standoff:9.2f} {flow:5.2f} {row}")
-        axes.plot(coverage, 100 * soiled, label=f"theory, {100 * standoff:.0f} cm")
+        axes.plot(coverage, 100 * painted, label=f"theory, {100 * standoff:.0f} cm")
     print("\nas planned, exact mask")
-    print("stand-off  weight coverage  soiled overspray      CV")
+    print("stand-off  weight coverage keep-out overspray      CV")
     for standoff in STANDOFFS[2:]:
         rows = [planned(mask, height, standoff, weight) for weight in WEIGHTS]
         for weight, row_of in zip(WEIGHTS, rows, strict=True):
@@ -98,9 +97,9 @@ def main() -> None:
         points = np.array([(row.coverage, row.keepout_paint) for row in rows])
         name = f"planned, {100 * standoff:.0f} cm"
         axes.plot(points[:, 0], 100 * points[:, 1], "o--", label=name)
-    if arguments.scene in ASKED:
-        least, most = ASKED[arguments.scene]
-        axes.plot(least, 100 * most, "k*", markersize=14, label="asked")
+    if arguments.scene in REQUIRED:
+        least, most = REQUIRED[arguments.scene]
+        axes.plot(least, 100 * most, "k*", markersize=14, label="required")
     axes.set(
         xlim=(0.92, 1.0), ylim=(0.0, 16.0), xlabel="coverage", ylabel="keep-out, %"
     )
@@ -112,21 +111,21 @@ def edges_of(mask: BoolArray, height: FloatArray) -> Edges:
     """Measures a scene's edges inside the tile."""
     along = np.abs(np.diff(mask.astype(int), axis=1)).sum() * CELL
     across = np.abs(np.diff(mask.astype(int), axis=0)).sum() * CELL
-    clean = height[~mask & np.isfinite(height)]
+    heights = height[~mask & np.isfinite(height)]
     return Edges(
         along=float(along),
         across=float(across),
         wall=float(mask.sum()) * CELL**2,
-        clean=float((~mask).sum()) * CELL**2,
-        recess=float(max(-np.median(clean), 0.0)) if clean.size else 0.0,
+        keepout=float((~mask).sum()) * CELL**2,
+        recess=float(max(-np.median(heights), 0.0)) if heights.size else 0.0,
     )
 
 
 def theory(edges: Edges, standoff: float, flow: float) -> tuple[FloatArray, FloatArray]:
-    """Returns coverage and soiled share (n,) over the offset of strokes from edges.
+    """Returns coverage and painted keep-out (n,) over the offset of strokes from edges.
 
-    Bare and soiled strips along both kinds of edges are shared so that an edge of
-    either kind gains as much coverage for a soiled centimetre.
+    Strokes along both kinds of edges have the same offset, so that either kind gains as
+    much coverage for a centimetre of painted keep-out.
 
     Args:
         edges: Of the scene.
@@ -141,20 +140,20 @@ def theory(edges: Edges, standoff: float, flow: float) -> tuple[FloatArray, Floa
         core = 1.0 - min(film / flow, 1.0) ** (1.0 / TIP.gamma)
         return float(np.sqrt(max(core, 0.0)))
 
-    covers, soils = a * reach(COVERED), a * reach(OVERSPRAYED * spread)
+    covers, paints = a * reach(COVERED), a * reach(OVERSPRAYED * spread)
     # A stroke's end: of the flow a share 1/2 + 3/4 s - 1/4 s³ has passed (beta2 = 2).
     s = np.linspace(-1.0, 1.0, 4001)
     passed = 0.5 + 0.75 * s - 0.25 * s**3
     end_covers = b * float(np.interp(COVERED, passed, s))
-    end_soils = -b * float(np.interp(min(OVERSPRAYED * spread, 0.5), passed, s))
+    end_paints = -b * float(np.interp(min(OVERSPRAYED * spread, 0.5), passed, s))
 
-    shift = np.linspace(0.0, 0.08, 641)  # m, strokes towards what stays clean.
-    bare = np.maximum(soils - covers - shift, 0.0)
-    dirty = np.maximum(shift * spread, 0.0)
-    end_bare = np.maximum(end_covers + end_soils - shift, 0.0)
+    shift = np.linspace(0.0, 0.08, 641)  # m, strokes towards the keep-out.
+    bare = np.maximum(paints - covers - shift, 0.0)
+    painted = np.maximum(shift * spread, 0.0)
+    end_bare = np.maximum(end_covers + end_paints - shift, 0.0)
     lost = edges.along * bare + edges.across * end_bare
-    soiled = (edges.along + edges.across) * dirty
-    return 1.0 - lost / edges.wall, soiled / edges.clean
+    lost_keepout = (edges.along + edges.across) * painted
+    return 1.0 - lost / edges.wall, lost_keepout / edges.keepout
 
 
 def planned(
