@@ -6,7 +6,7 @@ import pytest
 
 from painter.config import Scenario
 from painter.planning.tile import nominal_tile_pose
-from painter.robot.arm_model import GetArmKinematics, GetArmLimits
+from painter.robot.arm_model import GetArmKinematics, GetArmLimits, MakeArmPlant
 from painter.robot.reach_mapper import ReachMapper, main
 
 
@@ -62,7 +62,7 @@ def test_the_raster_keeps_its_speed_within_the_joint_limits(mapper):
 
 
 def test_the_mapper_reads_the_robot_from_its_models(mapper):
-    plant = mapper._checker.plant()
+    plant = MakeArmPlant(Scenario().directives)
     assert mapper.arm.reach == GetArmKinematics(plant).reach
     np.testing.assert_array_equal(mapper.limits.q_max, GetArmLimits(plant).q_max)
 
