@@ -16,6 +16,7 @@ from painter.cli.common import (
     print_result,
 )
 from painter.errors import InputError
+from perception.settings import validate
 
 if TYPE_CHECKING:
     from perception.mapping.calibration.charuco import BoardConfig
@@ -87,7 +88,7 @@ def _parse_board(argument: str) -> "BoardConfig":
             square=float(match[3]),
             marker=float(match[4]),
         )
-        config.validate()
+        validate(config, "board")
     except ValueError as error:
         raise InputError(f"--board {argument}: {error}", code="PNT-USE-001") from None
     return config

@@ -1,6 +1,6 @@
 """Hand-eye calibration by a ChArUco board that stands still before the camera."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -14,6 +14,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FloatArray, IntArray
 from perception.io.frames import ColorImage, Frame
 from perception.mapping.calibration.hand_eye import FEWEST, CalibrationError, HandEye
+from perception.settings import Conflict, setting, validate
 
 _DICTIONARY = cv2.aruco.DICT_5X5_100
 _FEWEST_CORNERS = 6
@@ -28,27 +29,19 @@ class BoardConfig:
     Attributes:
         columns: Squares across.
         rows: Squares down.
-        square: Edge of a square, m.
-        marker: Edge of a marker, m.
+        square: Edge of a square.
+        marker: Edge of a marker.
     """
 
-    columns: int = 8
-    rows: int = 6
-    square: float = 0.04
-    marker: float = 0.03
+    columns: int = setting(8, "1", least=3, most=100)
+    rows: int = setting(6, "1", least=3, most=100)
+    square: float = setting(0.04, "m", above=0.0, most=1.0)
+    marker: float = setting(0.03, "m", above=0.0, most=1.0)
 
-    def validate(self) -> None:
-        """Raises ValueError for a value out of bounds."""
-        for name in ("columns", "rows"):
-            if getattr(self, name) < 3:
-                raise ValueError(
-                    f"board.{name} must be >= 3, got {getattr(self, name)}."
-                )
-        if not 0.0 < self.marker < self.square < np.inf:
-            raise ValueError(
-                "board.marker must be > 0 and below board.square, "
-                f"got {self.marker!r} and {self.square!r}."
-            )
+    def conflicts(self) -> Iterator[Conflict]:
+        """Yields a marker that does not fit in a square."""
+        if self.marker >= self.square:
+            yield "marker", f"< square, {self.square!r} m", self.marker
 
     def board(self) -> cv2.aruco.CharucoBoard:
         """Returns OpenCV's board."""
@@ -95,7 +88,7 @@ def calibrate_on_board(
         CalibrationError: The board is seen in too few pictures.
         ValueError: The board is out of bounds.
     """
-    config.validate()
+    validate(config, "board")
     views = []
     for frame in frames:
         numbers, uv = find_corners(frame.color, config)

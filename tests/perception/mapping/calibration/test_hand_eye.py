@@ -8,6 +8,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.io.frames import Frame
 from perception.mapping.calibration.charuco import BoardConfig, calibrate_on_board
 from perception.mapping.calibration.hand_eye import CalibrationError, calibrate_on_wall
+from perception.settings import validate
 
 LOOKING = RotationMatrix(np.diag([1.0, -1.0, -1.0]))
 MOUNT = RigidTransform(
@@ -112,7 +113,7 @@ def test_too_few_pictures_are_refused(intrinsics):
 
 
 def test_invalid_boards_are_refused():
-    with pytest.raises(ValueError, match=r"board\.columns must be >= 3"):
-        BoardConfig(columns=2).validate()
-    with pytest.raises(ValueError, match=r"board\.marker must be > 0 and below"):
-        BoardConfig(marker=0.05).validate()
+    with pytest.raises(ValueError, match=r"board\.columns must be 3 to 100, got 2"):
+        validate(BoardConfig(columns=2), "board")
+    with pytest.raises(ValueError, match=r"board\.marker must be < square, 0\.04 m"):
+        validate(BoardConfig(marker=0.05), "board")
