@@ -197,15 +197,15 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     Args:
         name: A name from `named_scenarios()` or the path of a YAML file, whose single
             top key is the scenario's name.
-        overrides: Words "key=value" with dotted keys, e.g. "raster.speed=0.5"; the
-            value is read as YAML.
+        overrides: Settings "key=value" with dotted keys, e.g. "raster.speed=0.5"; the
+            value is read as YAML, and a later one wins.
 
     Returns:
         The scenario, checked.
 
     Raises:
-        InputError: There is no such scenario, a key is unknown or a value is not
-            allowed; names the file, the key and the bound.
+        InputError: There is no such scenario, a key is unknown or a value is out of
+            bounds; names the file, the field, the value and the bound.
     """
     path = Path(name)
     if path.suffix not in (".yaml", ".yml"):
@@ -239,8 +239,8 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         )
     fields = dict(fields or {})
     fields.setdefault("name", str(top))
-    for word in overrides:
-        _override(fields, word)
+    for override in overrides:
+        _override(fields, override)
     try:
         scenario = read_typed(Scenario, fields)
         validate(scenario)
@@ -255,24 +255,25 @@ def dump_scenario(scenario: Scenario) -> str:
     return text
 
 
-def _override(fields: dict[str, Any], word: str) -> None:
-    key, separator, text = word.partition("=")
+def _override(fields: dict[str, Any], override: str) -> None:
+    key, separator, text = override.partition("=")
     if not separator or not key:
         raise InputError(
-            f"--set {word!r}: expected key=value.", code="PNT-SCENARIO-007"
+            f"--set {override!r}: expected key=value.", code="PNT-SCENARIO-007"
         )
     *parents, last = key.split(".")
     for parent in parents:
         fields = fields.setdefault(parent, {})
         if not isinstance(fields, dict):
             raise InputError(
-                f"--set {word!r}: {parent!r} has no fields.", code="PNT-SCENARIO-008"
+                f"--set {override!r}: {parent!r} has no fields.",
+                code="PNT-SCENARIO-008",
             )
     try:
         fields[last] = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise InputError(
-            f"--set {word!r}: {_one_line(error)}", code="PNT-SCENARIO-009"
+            f"--set {override!r}: {_one_line(error)}", code="PNT-SCENARIO-009"
         ) from error
 
 
