@@ -12,27 +12,15 @@ from perception.values import WallSegmentation
 def preview_picture(
     preview: FilmPreview, segmentation: WallSegmentation, nominal: float
 ) -> Figure:
-    """Draws the film as planned, % of nominal, with the edges of what stays clean."""
+    """Draws the film as planned, % of nominal, with the edges of keep-out."""
     ny, nx = preview.film.shape
     low = -preview.border * preview.cell
-    right, top = low + nx * preview.cell, low + ny * preview.cell
-    figure = style.new_figure(5.8, 4.9)
-    axes = style.tile_axes(figure, right, top)
-    axes.set(xlim=(low, right), ylim=(low, top))
-    shown = axes.imshow(
-        100 * preview.film / nominal,
-        origin="lower",
-        extent=(low, right, low, top),
-        cmap="viridis",
-        vmin=0,
-        vmax=150,
-        interpolation="nearest",
-    )
+    size = nx * preview.cell, ny * preview.cell
+    figure, axes, bar = style.film_figure(preview.film / nominal, size, (low, low))
+    bar.set_label(f"wet film as planned [% of nominal {1e6 * nominal:.0f} µm]")
     mask = np.pad(np.asarray(segmentation.wall_mask), preview.border)
     x = low + (np.arange(nx) + 0.5) * preview.cell
     y = low + (np.arange(ny) + 0.5) * preview.cell
     if mask.any():
         axes.contour(x, y, mask, levels=[0.5], colors=[style.VERMILION], linewidths=1.1)
-    bar = figure.colorbar(shown, ax=axes, extend="max", shrink=0.9, pad=0.02)
-    bar.set_label(f"wet film as planned [% of nominal {1e6 * nominal:.0f} µm]")
     return figure

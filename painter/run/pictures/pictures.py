@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -48,14 +47,13 @@ def map_picture(p_TQs: FloatArray, size: tuple[float, float]) -> Figure:
     figure = style.new_figure(5.4, 4.4)
     axes = style.tile_axes(figure, *size)
     axes.set_facecolor(style.PALE)
-    shown = axes.imshow(
+    shown = style.show_grid(
+        axes,
         1000 * image,
-        origin="lower",
-        extent=(0, size[0], 0, size[1]),
+        size,
         cmap="PuOr_r",
         vmin=-1000 * limit,
         vmax=1000 * limit,
-        interpolation="nearest",
     )
     bar = figure.colorbar(shown, ax=axes, extend="both", shrink=0.9)
     bar.set_label("out of the wall's plane, towards the robot [mm]")
@@ -90,15 +88,7 @@ def label_picture(segmentation: WallSegmentation) -> Figure:
     colors = ["white", *style.SERIES, style.MUTED]
     figure = style.new_figure(5.4, 5.0)
     axes = style.tile_axes(figure, *size)
-    axes.imshow(
-        np.minimum(labels, shown + 1),
-        origin="lower",
-        extent=(0, size[0], 0, size[1]),
-        cmap=ListedColormap(colors),
-        vmin=-0.5,
-        vmax=len(colors) - 0.5,
-        interpolation="nearest",
-    )
+    style.show_kinds(axes, np.minimum(labels, shown + 1), colors, size)
     area = segmentation.cell**2
     entries = [
         Patch(color=colors[number], label=f"{number}: {count * area:.3f} m²")
@@ -125,28 +115,20 @@ def mask_picture(
     mask, size = segmentation.wall_mask, grid_size(segmentation)
     true = mask if truth is None else truth
     kinds = [
-        ("wall, to be painted", _WALL, mask & true),
-        ("not wall, kept clean", _NOT_WALL, ~mask & ~true),
+        ("paintable", _WALL, mask & true),
+        ("keep-out", _NOT_WALL, ~mask & ~true),
     ]
     if truth is not None:
         kinds += [
-            ("wall that was missed", style.BLUE, ~mask & true),
-            ("not wall, taken for wall", style.VERMILION, mask & ~true),
+            ("wall missed", style.BLUE, ~mask & true),
+            ("keep-out taken for wall", style.VERMILION, mask & ~true),
         ]
     image = np.zeros(mask.shape, dtype=int)
     for number, (_, _, cells) in enumerate(kinds):
         image[cells] = number
     figure = style.new_figure(5.4, 5.0)
     axes = style.tile_axes(figure, *size)
-    axes.imshow(
-        image,
-        origin="lower",
-        extent=(0, size[0], 0, size[1]),
-        cmap=ListedColormap([color for _, color, _ in kinds]),
-        vmin=-0.5,
-        vmax=len(kinds) - 0.5,
-        interpolation="nearest",
-    )
+    style.show_kinds(axes, image, [color for _, color, _ in kinds], size)
     area = segmentation.cell**2
     entries = [
         Patch(
@@ -167,15 +149,7 @@ def stroke_picture(program: PaintProgram, segmentation: WallSegmentation) -> Fig
     figure = style.new_figure(5.4, 5.0)
     axes = style.tile_axes(figure, *size)
     axes.set(xlim=(-0.05, size[0] + 0.05), ylim=(-0.06, size[1] + 0.06))
-    axes.imshow(
-        segmentation.wall_mask,
-        origin="lower",
-        extent=(0, size[0], 0, size[1]),
-        cmap=ListedColormap([_NOT_WALL, _WALL]),
-        vmin=0,
-        vmax=1,
-        interpolation="nearest",
-    )
+    style.show_kinds(axes, segmentation.wall_mask, [_NOT_WALL, _WALL], size)
     strokes = program.strokes
     for before, after in itertools.pairwise(strokes):
         way = np.stack([before.end_T, after.start_T])
@@ -243,25 +217,16 @@ def _stroke_entries(program: PaintProgram) -> Sequence[Line2D]:
 def film_picture(film: Film, nominal: float) -> Figure:
     """Draws the wet film with keep-out outlines, over µm and % of nominal."""
     ny, nx = film.thickness.shape
-    right, top = film.x0 + nx * film.cell, film.y0 + ny * film.cell
-    figure = style.new_figure(5.8, 4.9)
-    axes = style.tile_axes(figure, right, top)
-    axes.set(xlim=(film.x0, right), ylim=(film.y0, top))
-    shown = axes.imshow(
-        100 * film.thickness / nominal,
-        origin="lower",
-        extent=(film.x0, right, film.y0, top),
-        cmap="viridis",
-        vmin=0,
-        vmax=150,
-        interpolation="nearest",
-    )
+    low = film.x0, film.y0
+    size = nx * film.cell, ny * film.cell
+    figure, axes, bar = style.film_figure(film.thickness / nominal, size, low)
+    bar.set_label(f"wet film [% of nominal {1e6 * nominal:.0f} µm]")
     x = film.x0 + (np.arange(nx) + 0.5) * film.cell
     y = film.y0 + (np.arange(ny) + 0.5) * film.cell
     entries = []
     tile = film.truth_paintable | film.truth_keepout
     outlines = (
-        (film.truth_keepout, style.VERMILION, "edge of what stays clean", "-"),
+        (film.truth_keepout, style.VERMILION, "edge of keep-out", "-"),
         (tile, "white", "edge of the tile", (0, (4, 3))),
     )
     for cells, color, label, dashes in outlines:
@@ -277,8 +242,6 @@ def film_picture(film: Film, nominal: float) -> Figure:
             )
             line = "0.55" if color == "white" else color
             entries.append(Line2D([], [], color=line, ls=dashes, label=label))
-    bar = figure.colorbar(shown, ax=axes, extend="max", shrink=0.9, pad=0.02)
-    bar.set_label(f"wet film [% of nominal {1e6 * nominal:.0f} µm]")
     microns = bar.ax.secondary_yaxis(
         "left",
         functions=(

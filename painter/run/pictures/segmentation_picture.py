@@ -4,18 +4,19 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, TwoSlopeNorm
+from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 
 from painter.run.pictures import style
+from painter.run.pictures.pictures import grid_size
 from perception.paper_steps.pipeline import SegmentationStages
 from perception.values import WallSegmentation
 
 _WALL = "#8fc79a"
 _UNSEEN = "#d9dde1"
 _OTHERS = (style.ORANGE, style.SKY, style.BLUE, style.VERMILION, style.PURPLE)
-_DEPTH_LIMIT = 0.15  # Of the colour scale, m.
+_DEPTH_LIMIT = 15.0  # Of the colour scale, cm.
 
 
 def segmentation_picture(steps: SegmentationStages, *, title: str = "") -> Figure:
@@ -53,7 +54,7 @@ def draw_points(ax: Axes, steps: SegmentationStages) -> None:
     """
     found, result = steps.found, steps.segmentation
     p_TQs = result.X_WT.inverse() @ found.p_WQs
-    width, height = _size(result)
+    width, height = grid_size(result)
     inside = (p_TQs[:2] >= 0.0).all(axis=0)
     inside &= (p_TQs[0] <= width) & (p_TQs[1] <= height)
     ax.set_facecolor(_UNSEEN)
@@ -62,7 +63,7 @@ def draw_points(ax: Axes, steps: SegmentationStages) -> None:
     shown = shown[np.argsort(p_TQs[2, shown])]
     dots: dict[str, Any] = {"s": 1.2, "linewidths": 0, "rasterized": True}
     x, y, z = p_TQs[:, shown]
-    norm = _depth_norm(scale=100.0)
+    norm = TwoSlopeNorm(0.0, vmin=-_DEPTH_LIMIT, vmax=_DEPTH_LIMIT)
     points = ax.scatter(x, y, c=100.0 * z, cmap="RdYlBu", norm=norm, **dots)
     _add_bar(ax, points, "cm before the wall's plane")
     x, y, _ = p_TQs[:, inside & ~found.kept]
@@ -96,13 +97,7 @@ def draw_labels(ax: Axes, result: WallSegmentation) -> None:
             handles.append(
                 Patch(color=colors[-1], label=f"{label}: {kind}, {area:.2f} m²")
             )
-    ax.imshow(
-        result.labels,
-        cmap=ListedColormap(colors),
-        vmin=-0.5,
-        vmax=count + 0.5,
-        **_placement(result),
-    )
+    style.show_kinds(ax, result.labels, colors, grid_size(result))
     if handles:
         ax.legend(
             handles=handles,
@@ -114,24 +109,6 @@ def draw_labels(ax: Axes, result: WallSegmentation) -> None:
             frameon=False,
         )
     _finish(ax, result, f"Labels ({count} regions by area)")
-
-
-def draw_depth(ax: Axes, result: WallSegmentation) -> None:
-    """Draws the depth from the wall's plane.
-
-    Args:
-        ax: Where to draw.
-        result: The segmentation.
-    """
-    ax.set_facecolor(_UNSEEN)
-    image = ax.imshow(
-        100.0 * result.depth,
-        cmap="RdYlBu",
-        norm=_depth_norm(scale=100.0),
-        **_placement(result),
-    )
-    _add_bar(ax, image, "cm before the wall's plane")
-    _finish(ax, result, "Depth")
 
 
 def draw_residuals(ax: Axes, result: WallSegmentation) -> None:
@@ -147,9 +124,8 @@ def draw_residuals(ax: Axes, result: WallSegmentation) -> None:
     measured = residuals[np.isfinite(residuals)]
     away = np.abs(measured - np.median(measured)) if measured.size else np.zeros(1)
     limit = max(1.0, float(np.percentile(away, 95.0)))
-    image = ax.imshow(
-        residuals, cmap="RdBu", vmin=-limit, vmax=limit, **_placement(result)
-    )
+    limits: dict[str, Any] = {"vmin": -limit, "vmax": limit}
+    image = style.show_grid(ax, residuals, grid_size(result), cmap="RdBu", **limits)
     what = "plane" if result.surface is None else "surface"
     _add_bar(ax, image, f"mm before the wall's {what}")
     _finish(ax, result, f"Residuals of the wall (95 % within {limit:.0f} mm)")
@@ -162,7 +138,7 @@ def draw_mask(ax: Axes, result: WallSegmentation) -> None:
         ax: Where to draw.
         result: The segmentation.
     """
-    ax.imshow(result.wall_mask, cmap="gray", vmin=0, vmax=1, **_placement(result))
+    style.show_kinds(ax, result.wall_mask, ["black", "white"], grid_size(result))
     for opening in result.openings:
         ax.add_patch(
             Polygon(opening.p_TVs.T, fill=False, edgecolor=style.ORANGE, linewidth=1.5)
@@ -179,27 +155,8 @@ def _add_bar(ax: Axes, colored: Any, label: str) -> None:
     bar.ax.tick_params(labelsize=8)
 
 
-def _depth_norm(scale: float = 1.0) -> TwoSlopeNorm:
-    limit = _DEPTH_LIMIT * scale
-    return TwoSlopeNorm(0.0, vmin=-limit, vmax=limit)
-
-
-def _size(result: WallSegmentation) -> tuple[float, float]:
-    ny, nx = result.labels.shape
-    return nx * result.cell, ny * result.cell
-
-
-def _placement(result: WallSegmentation) -> dict[str, Any]:
-    width, height = _size(result)
-    return {
-        "origin": "lower",
-        "extent": (0.0, width, 0.0, height),
-        "interpolation": "nearest",
-    }
-
-
 def _finish(ax: Axes, result: WallSegmentation, title: str) -> None:
-    width, height = _size(result)
+    width, height = grid_size(result)
     ax.set(xlim=(0.0, width), ylim=(0.0, height), aspect="equal")
     ax.set_xlabel("T x, m", fontsize=8)
     ax.set_ylabel("T y, m", fontsize=8)

@@ -34,8 +34,8 @@ def test_mask_picture_names_the_areas_right_and_wrong(segmentation):
     truth[100, 70:80] = True
     figure = pictures.mask_picture(segmentation, truth)
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert "not wall, taken for wall: 0.010 m²" in texts
-    assert "wall that was missed: 0.001 m²" in texts
+    assert "keep-out taken for wall: 0.010 m²" in texts
+    assert "wall missed: 0.001 m²" in texts
 
 
 def test_label_picture_names_areas_and_what_was_not_seen(segmentation):
