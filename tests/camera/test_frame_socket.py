@@ -32,6 +32,6 @@ def test_pictures_arrive_whole_and_when_they_are_due(tmp_path):
         dut.wait_frame(1.0)
 
 
-def test_nobody_there_is_said(tmp_path):
+def test_a_missing_server_is_an_error(tmp_path):
     with pytest.raises(CameraError, match="No such file"):
         FrameClient(str(tmp_path / "none"), latency=0.1).wait_frame(0.1)

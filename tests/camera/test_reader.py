@@ -22,7 +22,7 @@ SILENT = object()
 
 
 class Clock:
-    """Stands still but for what the cameras add."""
+    """Advances only by what the cameras add."""
 
     def __init__(self):
         self.time = 100.0
@@ -114,7 +114,7 @@ def test_the_newest_picture_and_its_time_are_read():
 
 
 def test_repeated_and_skipped_pictures_are_counted():
-    # The second came twice; three were taken that never came.
+    # The second arrived twice; three were taken that never arrived.
     camera = Script([0.0, 10.0, 10.0, 10.033], numbers=[1, 2, 2, 6])
     with Bench(camera) as bench:
         health = wait_for(bench.reader, lambda r: r.health.skipped == 3).health
@@ -165,7 +165,7 @@ def test_a_lost_camera_is_reopened(steps, words):
     assert "Reopening, try 1 of 2." in missing.problem
 
 
-def test_tries_are_bounded_and_the_end_is_said():
+def test_tries_are_bounded_and_the_loss_is_reported():
     opened = []
 
     def fail():
@@ -182,7 +182,7 @@ def test_tries_are_bounded_and_the_end_is_said():
     assert len(opened) == 3
 
 
-def test_pictures_make_the_tries_count_anew():
+def test_a_picture_resets_the_tries():
     # Each camera gives a picture and fails: never two failures in a row without one.
     cameras = [
         Script([0.0, CameraError("lost.", code="PNT-TEST-001")]) for _ in range(5)
@@ -192,7 +192,7 @@ def test_pictures_make_the_tries_count_anew():
         assert health.state != CameraState.LOST
 
 
-def test_a_rendered_picture_comes_through_librealsense():
+def test_a_rendered_picture_passes_librealsense():
     pytest.importorskip("pyrealsense2")
 
     class Source:

@@ -108,7 +108,7 @@ def test_the_temporal_filter_evens_noise_of_a_scene_at_rest():
     assert last.depth_mm.astype(float).std() == pytest.approx(2.0, abs=0.5)
 
 
-def test_pictures_of_another_size_are_refused():
+def test_pictures_of_another_size_are_rejected():
     dut = software(Pictures((np.ones((48, 64), np.uint16), None, 0.0)))
     with pytest.raises(CameraError, match=r"must be \(480, 848\) px.* got \(48, 64\)"):
         dut.wait(0.1)
@@ -172,7 +172,7 @@ def test_damaged_recordings_are_named(tmp_path, content):
         open_recording(CameraDriverConfig(recording=str(path)), CAMERA)
 
 
-def test_what_is_not_there_is_named(tmp_path):
+def test_a_missing_recording_or_stream_is_named(tmp_path):
     config = CameraDriverConfig(recording=str(tmp_path / "none.bag"))
     with pytest.raises(CameraError, match="none.bag: no such recording"):
         open_recording(config, CAMERA)
@@ -183,12 +183,12 @@ def test_what_is_not_there_is_named(tmp_path):
 @pytest.mark.skipif(
     len(rs.context().query_devices()) > 0, reason="a camera is connected"
 )
-def test_no_camera_says_so():
+def test_a_missing_camera_is_named():
     with pytest.raises(CameraError, match="no RealSense device is connected"):
         open_device(CameraDriverConfig(), CAMERA)
 
 
-def test_depth_in_other_units_comes_out_in_mm():
+def test_depth_in_other_units_is_converted_to_mm():
     device = rs.software_device()
     sensor = device.add_sensor("Stereo Module")
     stream = rs.video_stream()

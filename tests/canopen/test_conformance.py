@@ -191,7 +191,7 @@ def test_the_drives_own_transitions_after_power_on():
 
 
 def test_the_drives_own_transitions_at_a_fault(bench):
-    # 7.2.2, transitions 13 and 14: fault reaction as 605Eh says, then fault.
+    # 7.2.2, transitions 13 and 14: fault reaction by 605Eh, then fault.
     assert bench.write(0x605E, 0, 2, 2) == 0
     bench.move()
     bench.dut.trip(0x3220)
@@ -206,7 +206,7 @@ def test_the_drives_own_transitions_at_a_fault(bench):
 def test_every_transition_of_the_standard_is_in_a_test():
     own = {0, 1, 13, 14}
     assert {row[0] for row in TRANSITION_TABLE} | own == set(range(17))
-    # And the master's table says the same as the standard's.
+    # And the master's table equals the standard's.
     known = {
         (number, STATUS_CODES[start][1], int(word), STATUS_CODES[end][1])
         for (start, word), (number, end) in TRANSITIONS.items()

@@ -14,7 +14,7 @@ AT_ONCE = 4
 
 
 class Noise:
-    """A port that sends what a broken or hostile node might."""
+    """A port that sends the frames of a broken or hostile node."""
 
     def __init__(self, rack: Rack, seed: int):
         self.random = random.Random(seed)
@@ -91,7 +91,7 @@ def test_forged_feedback_may_stop_the_arm_but_never_move_it(lab, total):
         moved = np.abs(positions(lab) - before)
         # Once acknowledged, "target := actual" may take a forged position for the
         # actual one: the drives' own speed limit and following error bound that, so it
-        # is looked at before it is acknowledged.
+        # is inspected before it is acknowledged.
         assert moved.max() <= 2.0
         if lab.master.state == BusState.STOPPED:
             stops += 1

@@ -48,12 +48,12 @@ def state_is(process, state):
     return check
 
 
-def set_link(word):
-    subprocess.run(["ip", "link", "set", CHANNEL, word], check=True)
+def set_link(state):
+    subprocess.run(["ip", "link", "set", CHANNEL, state], check=True)
 
 
 def send_raw(can_id, data=bytes(8)):
-    """Sends as a controller's driver does: error frames cannot come from elsewhere."""
+    """Sends like the driver of a controller, the only source of error frames."""
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as raw:
         raw.bind((CHANNEL,))
         raw.send(struct.pack("=IB3x8s", can_id, len(data), data))
@@ -73,7 +73,11 @@ def bus():
 
 @pytest.fixture
 def drives(bus):
-    code = "from painter.cli.main import main; main()"
+    # A script starts background jobs with SIGINT ignored; children inherit that.
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from painter.cli.main import main; main()"
+    )
     command = [sys.executable, "-c", code, "drives", "--json"]
     command += ["--interface", "socketcan", "--channel", CHANNEL]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

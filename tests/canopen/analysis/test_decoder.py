@@ -1,4 +1,4 @@
-"""Frames in words: the frames are written by hand from CiA 301 and 402."""
+"""Decoded frames: the frames are written by hand from CiA 301 and 402."""
 
 import pytest
 
@@ -81,7 +81,7 @@ def sdo(command, index, sub, value):
         (0x301, [1], Kind.OTHER, "", "301h 01"),
     ],
 )
-def test_frames_in_words(decoder, cob_id, data, kind, node, text):
+def test_frames_are_decoded(decoder, cob_id, data, kind, node, text):
     found = decoder.decode(Frame(cob_id, bytes(data)))
     assert (found.kind, found.node, found.text) == (kind, node, text)
 
@@ -117,7 +117,7 @@ def test_frames_in_words(decoder, cob_id, data, kind, node, text):
         ),
     ],
 )
-def test_sdo_answers_in_words(decoder, request_frame, answer, text):
+def test_sdo_answers_are_decoded(decoder, request_frame, answer, text):
     asked = decoder.decode(Frame(0x601, sdo(*request_frame)))
     assert not asked.is_news
     found = decoder.decode(Frame(0x581, sdo(*answer)))
@@ -198,12 +198,12 @@ def test_controlwords(word, mode, text):
     assert controlword_text(word, mode) == text
 
 
-def test_unknown_modes_are_said_to_be():
+def test_unknown_modes_are_named_as_such():
     assert mode_text(6) == "HOMING"
     assert mode_text(-3) == "not used here"
 
 
-def test_error_frames_in_words(decoder):
+def test_error_frames_are_decoded(decoder):
     # Linux, include/uapi/linux/can/error.h.
     found = decoder.decode(Frame(0x44, bytes(8), is_error=True))
     assert found.text == "controller problem, bus-off"

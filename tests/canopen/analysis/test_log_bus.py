@@ -51,7 +51,7 @@ def test_samples_are_where_the_arm_was_at_each_sync(recorded):
     )
 
 
-def test_time_passes_only_when_told(recorded):
+def test_time_advances_only_in_wait_until(recorded):
     recorded.run(0.5)
     dut = LogBus(recorded.bus, recorded.records)
     assert dut.now() == dut.begin
@@ -74,7 +74,7 @@ def test_time_passes_only_when_told(recorded):
         (Fault.HEARTBEAT_LOST, "the master stopped the arm"),
     ],
 )
-def test_what_stopped_the_arm_is_named(recorded, fault, words):
+def test_the_reason_of_a_stop_is_named(recorded, fault, words):
     recorded.run(0.2)
     at = recorded.now
     recorded.rack.inject(fault)
@@ -88,6 +88,6 @@ def test_what_stopped_the_arm_is_named(recorded, fault, words):
     assert at - 0.005 <= feedback.stopped_at <= at + 0.4
 
 
-def test_a_log_without_motion_is_refused(make_lab):
+def test_a_log_without_motion_is_rejected(make_lab):
     with pytest.raises(InputError, match="at no time in the log are all drives"):
         LogBus(make_lab().bus, [LogRecord(0.1, Frame(SYNC_ID))] * 2)

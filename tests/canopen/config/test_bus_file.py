@@ -18,7 +18,7 @@ PAINTER = models_path("bus", "painter.bus.yaml")
 
 
 def write(tmp_path, change):
-    """A bus file like the robot's but for what `change` does to its fields."""
+    """Writes the robot's bus file with its fields changed by `change`."""
     fields = yaml.safe_load(PAINTER.read_text())
     change(fields)
     path = tmp_path / "x.bus.yaml"
@@ -108,7 +108,9 @@ def test_mode_is_csp_else_ip(file, mode):
         ({"eds": "zeroerr_erob.eds", "identity": {"vendor": 1}}, "identity.vendor"),
     ],
 )
-def test_a_drive_that_cannot_is_refused_with_the_reason(tmp_path, fields, message):
+def test_a_drive_that_lacks_a_function_is_rejected_with_the_reason(
+    tmp_path, fields, message
+):
     def change(f):
         f["drives"]["base_yaw"]["identity"] = {}
         f["drives"]["base_yaw"].update(fields)

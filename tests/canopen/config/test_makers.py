@@ -74,7 +74,7 @@ def test_rpm_drives_get_rpm(makers):
     assert maxon.number(0x6085) == np.floor(20.0 * 100 * 60 / (2 * np.pi))
 
 
-def test_what_a_drive_cannot_be_told_is_said(makers):
+def test_objects_that_a_drive_lacks_are_noted(makers):
     notes = {d.name: " ".join(d.plan.notes) for d in makers.master.drives}
     assert "607Fh" in notes["elbow_pitch"]
     assert "only the host enforces this limit" in notes["elbow_pitch"]
@@ -94,7 +94,7 @@ def test_each_maker_stops_with_the_others(makers, axis):
     assert axis in lab.master.reason
     for drive in lab.rack.drives.values():
         assert abs(drive.motor.velocity) < 1.0
-    # Without 605Ah the drive passes on to SWITCH ON DISABLED when it stands.
+    # Without 605Ah the drive goes to SWITCH ON DISABLED when it has stopped.
     held = {"base_yaw", "wrist_left", "wrist_right"} - {axis}
     assert all(lab.rack.drives[name].state == State.QUICK_STOP for name in held)
     assert lab.rack.io.outputs == 0
@@ -104,7 +104,7 @@ def test_each_maker_stops_with_the_others(makers, axis):
     assert lab.master.state == BusState.ENABLED, lab.master.reason
 
 
-def test_a_value_beyond_the_drives_range_is_refused(make_lab, tmp_path):
+def test_a_value_beyond_the_drives_range_is_rejected(make_lab, tmp_path):
     fast = {"base_yaw": {**MAKERS["base_yaw"], "gear": 5000}}
     bus = load_bus(write_bus(tmp_path, fast))
     with pytest.raises(InputError, match="607Fh:0. must be 1 to 50000, got 95493"):
@@ -148,7 +148,7 @@ def test_homing_that_takes_too_long_stops(make_lab, tmp_path):
 def test_a_value_that_reads_back_differently_ends_bring_up(make_lab):
     lab = make_lab()
     store = lab.rack.drives["elbow_pitch"].store
-    # A drive that rounds its ramp and says nothing.
+    # A drive that rounds its ramp without an abort.
     store.written = lambda i, sub, v: i == 0x6085 and store.set(i, sub, int(v) // 2)
     lab.master.start()
     lab.until(lambda: lab.master.state != BusState.STARTING)

@@ -111,12 +111,12 @@ def test_a_fault_stops_all_axes_and_closes_the_gun(
     q = lab.master.feedback().q
     lab.until(lambda: has_stopped(lab), 2.0)
     lab.run(0.5)
-    # Axes that can be told stop by 6085h; the rest by the drives' own watch.
+    # Axes that receive a command stop by 6085h, the others by the drive's own monitor.
     assert has_stopped(lab)
-    # Where nothing can be sent, the I/O node closes a cycle after the last word.
+    # Where nothing can be sent, the I/O node closes a cycle after the last RPDO.
     assert closing_time(lab) - known <= CYCLE + 1e-9
     if fault not in (Fault.BUS_OFF, Fault.INTERFACE_DOWN):
-        # 0.63 rad/s at 10 rad/s2 is 0.02 rad; two cycles until it is told.
+        # 0.63 rad/s at 10 rad/s2 is 0.02 rad; two cycles until it gets the command.
         travel = np.abs(lab.master.feedback().q - q)
         assert travel.max() < 0.63**2 / 20.0 + 0.63 * 3 * CYCLE + 1e-3
     assert lab.rack.io.outputs == 0
@@ -163,7 +163,7 @@ def test_bring_up_ends_with_the_reason(make_lab, fault, reason):
     assert lab.master.state == BusState.STOPPED
     assert reason in lab.master.reason
     lab.run(0.5)
-    # Nothing stays under power but what holds itself by a quick stop.
+    # Only drives that hold by a quick stop keep their power.
     states = {drive.state for drive in lab.rack.drives.values()}
     assert State.ENABLED not in states
     lab.rack.clear()
@@ -288,7 +288,7 @@ def test_a_skipped_cycle_makes_the_arm_wait_and_not_jump(lab, make_lab):
     assert lab.master.state == BusState.ENABLED, lab.master.reason
     counts = 65536 * 100 / (2 * np.pi)
     assert np.abs(speed).max() / counts < 1.73 * 1.03
-    # 5 ms are made up for at 2 % in 0.25 s.
+    # At 2 %, 5 ms are caught up in 0.25 s.
     path, samples = lab.path, []
     lab.master.measured = lambda *sample: samples.append(sample)
     lab.run(0.2)
@@ -297,7 +297,7 @@ def test_a_skipped_cycle_makes_the_arm_wait_and_not_jump(lab, make_lab):
 
 
 class LateTransport:
-    """What drives send is held up on its way for some cycles."""
+    """Delays frames of the drives by some cycles."""
 
     def __init__(self, lab):
         self._rack, self._receive = lab.rack, lab.rack.transport.receive
@@ -318,7 +318,7 @@ class LateTransport:
 
 
 @pytest.mark.parametrize("late", [1, 3])
-def test_what_comes_late_is_not_taken_for_where_the_arm_is_now(lab, late):
+def test_a_late_answer_is_not_taken_for_the_present_position(lab, late):
     samples, transport = [], LateTransport(lab)
     lab.master.measured = lambda *sample: samples.append(sample)
     lab.sway()
@@ -360,7 +360,7 @@ def test_switching_off_closes_the_brakes(lab):
     assert states == {State.SWITCH_ON_DISABLED}
 
 
-def test_the_arm_is_where_a_setpoint_says_when_it_says(lab):
+def test_the_arm_is_at_each_setpoint_at_its_time(lab):
     samples = []
     lab.master.measured = lambda *sample: samples.append(sample)
     lab.sway()

@@ -35,7 +35,7 @@ def test_nothing_is_commanded_before_the_first_setpoint():
     assert dut.sample(0.5) is None
 
 
-def test_after_the_last_setpoint_its_age_is_told():
+def test_after_the_last_setpoint_a_sample_has_its_age():
     dut = SetpointBuffer()
     dut.push([point(1.0, 0.3, 0.1)])
     assert dut.sample(1.25).lag == pytest.approx(0.25)
@@ -67,7 +67,7 @@ def test_the_trigger_holds_until_the_next_setpoint():
         ([Setpoint(1.0, np.zeros(4), np.zeros(5))], "must be 5 finite"),
     ],
 )
-def test_unusable_setpoints_are_refused(points, message):
+def test_unusable_setpoints_are_rejected(points, message):
     with pytest.raises(ValueError, match=message):
         SetpointBuffer().push(points)
 

@@ -16,7 +16,7 @@ def clock(monkeypatch):
     return now
 
 
-def test_ticks_come_one_period_apart(clock):
+def test_ticks_are_one_period_apart(clock):
     dut = realtime.Ticker(0.005)
     # Awake half a millisecond before the tick.
     assert dut.remaining() == pytest.approx(0.0045)
@@ -45,7 +45,7 @@ def test_at_half_the_rate_a_period_takes_the_machine_twice_as_long(clock):
     clock[0] = 100.0102
     assert dut.tick() == (pytest.approx(50.005), 0)
     dut.wait_until_due()
-    # Lateness is the machine's: that is what is judged.
+    # Lateness is in machine time.
     assert dut.lateness().worst == pytest.approx(2e-4)
 
 
@@ -92,10 +92,10 @@ def test_memory_that_may_not_be_locked_is_no_error():
 
 
 def test_without_the_right_to_fifo_there_is_a_warning(monkeypatch, caplog):
-    def refuse(*args):
+    def deny(*args):
         raise PermissionError(1, "Operation not permitted")
 
-    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    monkeypatch.setattr(os, "sched_setscheduler", deny)
     with caplog.at_level(logging.WARNING):
         assert not realtime.use_fifo()
     assert "no SCHED_FIFO" in caplog.text
@@ -120,10 +120,10 @@ def test_processors_are_asked_to_stay_awake_for_as_long_as_it_matters(
 def test_a_niceness_that_may_not_be_had_is_no_error(monkeypatch):
     asked = []
 
-    def refuse(*args):
+    def deny(*args):
         asked.append(args)
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(os, "setpriority", refuse)
+    monkeypatch.setattr(os, "setpriority", deny)
     realtime.set_niceness(-18)
     assert asked == [(os.PRIO_PROCESS, 0, -18)]

@@ -43,7 +43,7 @@ def expand(pattern: str) -> list[str]:
 
 
 @pytest.mark.parametrize(("pattern", "state"), STATUS_TABLE)
-def test_every_statusword_shows_its_state(pattern, state):
+def test_every_statusword_holds_its_state(pattern, state):
     assert all(state_of(int(word, 2)) == state for word in expand(pattern))
 
 
@@ -55,7 +55,7 @@ def test_state_codes_exclude_each_other():
 
 
 @pytest.mark.parametrize(("pattern", "command"), COMMAND_TABLE)
-def test_every_controlword_gives_its_command(pattern, command):
+def test_every_controlword_holds_its_command(pattern, command):
     for word in expand(pattern):
         b7, b3, b2, b1, b0 = (int(bit) for bit in word)
         assert command_of(b7 << 7 | b3 << 3 | b2 << 2 | b1 << 1 | b0) == command

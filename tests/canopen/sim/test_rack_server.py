@@ -1,4 +1,4 @@
-"""The simulated drives' time follows the SYNCs, whatever holds up either process."""
+"""The simulated drives' time follows the SYNCs, whatever delays either process."""
 
 import dataclasses
 import itertools
@@ -26,7 +26,7 @@ def bench(tmp_path, monkeypatch):
     bench.server = RackServer(bus)
     bench.server.transport.receive = bench.receive
     bench.server.rack.wire.attach(bench.hear)
-    bench.tell(milliseconds=5)
+    bench.set_cycle(milliseconds=5)
     yield bench
     bench.server.close()
 
@@ -37,8 +37,8 @@ class Bench:
         self.batch = []
         self.heard = []
 
-    def tell(self, milliseconds):
-        """Drives are told when SYNCs come, and made operational."""
+    def set_cycle(self, milliseconds):
+        """Writes the cycle to the drives and makes them operational."""
         for drive in self.server.rack.drives.values():
             drive.store.fix(0x60C2, 1, milliseconds)
             drive.nmt = NmtState.OPERATIONAL
@@ -74,8 +74,8 @@ def test_late_syncs_are_a_cycle_apart_for_the_drives(bench):
     assert bench.server.slips == 0
 
 
-def test_the_cycle_is_what_the_drives_were_told_whatever_their_bus_file_says(bench):
-    bench.tell(milliseconds=40)
+def test_the_cycle_is_that_written_to_the_drives_not_that_of_the_bus_file(bench):
+    bench.set_cycle(milliseconds=40)
     for arrival in (100.040, 100.080, 100.123, 100.160):
         bench.until(arrival)
         bench.batch = [SYNC]
@@ -101,11 +101,11 @@ def test_a_silent_master_does_not_stop_the_drives_time(bench):
     held = bench.server.rack.now
     assert held == pytest.approx(bench.syncs()[0] + 0.005, abs=1e-3)
     bench.until(100.2)
-    # It has waited for 50 ms and made up for them.
+    # It has waited for 50 ms and caught up.
     assert bench.server.rack.now == pytest.approx(0.2, abs=3e-3)
 
 
-def test_targets_that_came_before_a_late_sync_are_heard_before_it(bench):
+def test_targets_received_before_a_late_sync_are_carried_before_it(bench):
     bench.until(100.005)
     bench.batch = [SYNC, TARGET]
     bench.until(100.018)

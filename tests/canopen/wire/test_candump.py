@@ -28,7 +28,7 @@ def test_a_line_of_the_manual_is_read():
         "(1436509052.249713) can0 000#0105 T",
     ],
 )
-def test_what_is_read_is_written_the_same(line):
+def test_lines_survive_reading_and_writing(line):
     record = parse_line(line)
     assert format_record(record, "can0") == line
 
@@ -47,7 +47,7 @@ def test_error_frames_keep_their_class():
         "(1.0) can0 123##100112233",  # CAN FD.
     ],
 )
-def test_frames_that_are_not_canopens_are_told_apart(line):
+def test_frames_of_other_kinds_are_left_out(line):
     assert parse_line(line) is None
 
 

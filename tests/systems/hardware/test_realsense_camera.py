@@ -49,7 +49,7 @@ def test_the_picture_has_the_time_at_which_it_was_taken(connection):
     connection.advance(1.0)
     connection.picture(1, age=0.05)
     connection.advance(0.03)  # The look due at 1.0 s was left for now.
-    # Its age is measured in this computer's time, which runs on while the test does.
+    # Its age is measured by this computer's clock, which runs during the test.
     assert connection.port("image_time")[0] == pytest.approx(1.0 - 0.05, abs=0.01)
     assert (connection.port("depth_image").data == 700).all()
 
@@ -85,7 +85,7 @@ def test_colour_is_shown_where_it_fits(connection):
     assert (connection.port("color_image").data == (0, 0, 0, 255)).all()
 
 
-def test_a_missing_camera_says_so(connection):
+def test_a_missing_camera_is_in_the_status(connection):
     connection.advance(0.1)
     problem = "camera: no picture for 1 s. Reopening, try 1 of 5."
     connection.reading = Reading(
