@@ -13,8 +13,8 @@ PYTHON ?= python3 python3.13 python3.12 python3.11
 SYSTEM_PACKAGES := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libgomp1 libusb-1.0-0 \
   libx11-6
 # `speed` takes a quarter of an hour, `findings` (what is found, not how fast) hours.
-BENCHES := $(addprefix speed.,candump canopen_timing facade mapping planner segmentation) \
-  findings.strokes
+BENCHES := $(addprefix speed.,candump canopen_timing command_start facade mapping \
+  planner segmentation) findings.strokes
 LONG_BENCHES := $(addprefix findings.,edge_bound edges fine_steps hil low_plates \
   map_recordings map_sessions masks masks_pcl misplaced scanned_film)
 PYTEST_ARGS ?= -n 2 --dist loadfile

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from painter.canopen.wire.candump import LogRecord
 
 LogArgument = Annotated[
-    Path, typer.Argument(help="Log in candump's format (candump -L).")
+    Path, typer.Argument(metavar="LOG", help="Log in candump's format (candump -L).")
 ]
 ChangesOption = Annotated[
     bool,
     typer.Option(
         "--changes",
-        help="Show only news: commands, state changes, answers to SDO requests, "
-        "emergencies, errors.",
+        help="Leave out what repeats: show only commands, state changes, answers to "
+        "SDO requests, emergencies and errors.",
     ),
 ]
 NodeOption = Annotated[
@@ -70,8 +70,8 @@ def canlog(
 ) -> None:
     """Show a log of the bus in CiA 301 and CiA 402 terms, or its figures.
 
-    The log is that of `painter deploy --log-bus` or of `candump -L`. Times count from
-    its start. --summary and --json print figures instead of frames: frame counts, bus
+    Reads logs of `painter deploy --log-bus` and of `candump -L`. Times count from the
+    log's start. --summary and --json print figures instead of frames: frame counts, bus
     load, SYNC jitter, and every emergency, SDO abort and error frame.
     """
     from painter.canopen.config.bus_file import load_bus

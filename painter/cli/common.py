@@ -26,7 +26,7 @@ def complete_scenario(incomplete: str) -> list[str]:
 ScenarioArgument = Annotated[
     str | None,
     typer.Argument(
-        metavar="[SCENARIO]",
+        metavar="SCENARIO",
         help="Named scenario or path of a scenario's YAML file.  [default: cubes, or "
         "the scenario of the run that is resumed or touched up]",
         show_default=False,
@@ -59,7 +59,9 @@ RunFolderOption = Annotated[
 ]
 ResumeOption = Annotated[
     Path | None,
-    typer.Option(metavar="RUN", help="Resume a stopped run: paint what it left."),
+    typer.Option(
+        metavar="RUN", help="Resume a stopped run: paint the strokes that are left."
+    ),
 ]
 BusOption = Annotated[
     Path | None,
@@ -83,9 +85,9 @@ RateOption = Annotated[
     typer.Option(
         min=0.05,
         max=1.0,
-        help="Speed of the run's clock against real time. Below 1, simulated drives, "
-        "world and planning get more computing time. `painter drives` and `painter "
-        "deploy` must use the same value.",
+        help="Speed of the run's clock against real time. Below 1, drives, world and "
+        "planning have more time to compute. `painter drives` and `painter deploy` "
+        "must use the same value.",
     ),
 ]
 IncludeOption = Annotated[

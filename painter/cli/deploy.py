@@ -32,7 +32,7 @@ CameraOption = Annotated[
         metavar="PATH",
         help="Rehearsal: read pictures from this socket of `painter drives "
         "--scenario`, through librealsense's software device. Deadlines of process "
-        "data grow to 0.1 s, since this computer also simulates.  [default: a camera]",
+        "data grow to 0.1 s, since this computer also simulates.  [default: camera]",
     ),
 ]
 DryRunOption = Annotated[
@@ -41,7 +41,7 @@ DryRunOption = Annotated[
 SpeedOption = Annotated[
     float,
     typer.Option(
-        min=0.05, max=1.0, help="Share of all speeds; below 1 needs --dry-run."
+        min=0.05, max=1.0, help="Fraction of all speeds; below 1 needs --dry-run."
     ),
 ]
 StepOption = Annotated[
@@ -56,8 +56,8 @@ AheadOption = Annotated[
     typer.Option(
         min=0.1,
         max=0.9,
-        help="Time from a command to its execution, s: longest delay of the program "
-        "that does not stop the arm.",
+        help="Time from a command to its execution, s. The arm keeps moving through "
+        "stalls of this program that are shorter.",
     ),
 ]
 

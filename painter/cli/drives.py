@@ -89,7 +89,7 @@ def drives(
 ) -> None:
     """Run simulated drives and the I/O node of a bus file on a CAN interface.
 
-    They answer like real drives, faults included, and take the time of a real bus.
+    They behave like real drives, faults included, with the timing of a real bus.
 
     Raises:
         InputError: An option is wrong.

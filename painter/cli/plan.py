@@ -69,7 +69,7 @@ def plan(
     """Plan the paint program of a segmented wall.
 
     The arm starts and ends at its home pose. Writes program.json, trajectory.npz,
-    program.png and film.png, the film to expect.
+    program.png and film.png, the predicted film.
 
     Raises:
         InputError: Options exclude each other or name files that cannot be read.

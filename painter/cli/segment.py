@@ -80,14 +80,14 @@ CellOption = Annotated[
 InlierOption = Annotated[
     float | None,
     typer.Option(
-        help="Greatest distance of a wall point from the wall's plane, m.  [default: "
+        help="Maximum distance of a wall point from the wall's plane, m.  [default: "
         "four standard deviations of the noise, 0.006 to 0.03]"
     ),
 ]
 SetBackOption = Annotated[
     float,
     typer.Option(
-        help="Greatest distance behind the plane, m, at which parts beside it, such as "
+        help="Maximum distance behind the plane, m, at which parts beside it, such as "
         "dormers, still count as wall."
     ),
 ]

@@ -1,4 +1,4 @@
-"""The paint program of one segmented tile, with the film to expect."""
+"""The paint program of one segmented tile, with the predicted film."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -94,7 +94,7 @@ def plan_tile(
         show: Called with the share of the work that is done, 0 to 1, and its step.
 
     Returns:
-        The program, the film to expect, and figures.
+        The program, the predicted film, and figures.
 
     Raises:
         InputError: A file cannot be read, or options exclude each other.

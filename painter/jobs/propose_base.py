@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from painter.config import Scenario
+from painter.config import Scenario, load_scenario
 from painter.errors import InputError
 from painter.planning.arm.placement import Placement, propose_distance
 from painter.planning.config import ZoneConfig
@@ -64,15 +64,17 @@ class BaseProposal:
 
 
 def propose_base(
-    job: Scenario,
+    scenario: Scenario | str,
     width: float,
     height: float,
     zones: Sequence[ZoneConfig] = (),
 ) -> BaseProposal:
     """Proposes the distance of the base, and its positions along a wall.
 
+    Example: `propose_base("cubes", 10.0, 6.0).figures()["base_x"]`.
+
     Args:
-        job: Robot, tile, tip and raster.
+        scenario: Robot, tile, tip and raster; a `Scenario`, a name or a path.
         width: Of the wall, m.
         height: Of the wall, m.
         zones: What of the wall is painted and what is not.
@@ -81,6 +83,7 @@ def propose_base(
         InputError: The wall is too small to be divided into tiles.
         ReachError: The tile cannot be reached from any distance.
     """
+    job = load_scenario(scenario) if isinstance(scenario, str) else scenario
     mapper = ReachMapper(job)
     shoulder_height = mapper.arm.shoulder_height
     placement = propose_distance(
