@@ -4,7 +4,7 @@ import importlib.metadata
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import overload
+from typing import Unpack, overload
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -15,6 +15,7 @@ from painter.cycle.earlier_run import EarlierRun
 from painter.cycle.running_cycle import Watch
 from painter.cycle.simulate import SimulateCycle
 from painter.cycle.write_run import event_watch, write_log
+from painter.diagrams.brain import OwnSystems
 from painter.errors import InputError
 from painter.planning.strokes.spray_settings import SpraySettings
 from painter.run.folder.folder import SCENE, RunFolder
@@ -39,6 +40,7 @@ def simulate(
     replay: bool = ...,
     stop_at_stroke: float | None = ...,
     show: Show | None = ...,
+    **own: Unpack[OwnSystems],
 ) -> CycleLog: ...
 
 
@@ -52,6 +54,7 @@ def simulate(
     replay: bool = ...,
     stop_at_stroke: float | None = ...,
     show: Show | None = ...,
+    **own: Unpack[OwnSystems],
 ) -> Run: ...
 
 
@@ -64,6 +67,7 @@ def simulate(
     replay: bool = False,
     stop_at_stroke: float | None = None,
     show: Show | None = None,
+    **own: Unpack[OwnSystems],
 ) -> Run | CycleLog:
     """Simulates a whole paint cycle: look, scan, segment, plan, paint, report.
 
@@ -79,6 +83,8 @@ def simulate(
         stop_at_stroke: Abort as an operator would when this stroke is reached, counted
             from 1; 12.4 is within the twelfth.
         show: Called with the share of the cycle that is done, 0 to 1, and its phase.
+        own: `finder`, `segmenter`, `planner`, `mover`, `accumulator`: systems of one's
+            own in place of the brain's; see `OwnSystems`.
 
     Returns:
         The run, or without `out` the log of the cycle: joints, gun poses, map,
@@ -107,6 +113,7 @@ def simulate(
         film=None if earlier is None else earlier.film,
         meshcat=viewer,
         watch=_watch(folder, show, stop_at_stroke),
+        **own,
     )
     if folder is None:
         return log
