@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
 
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FloatArray, IntArray
 from perception.io.frames import ColorImage, Frame
 from perception.mapping.calibration.hand_eye import FEWEST, CalibrationError, HandEye
+from perception.mapping.pose_graph.poses import pose_of, step_to
 from perception.settings import Conflict, setting, validate
 
 _DICTIONARY = cv2.aruco.DICT_5X5_100
@@ -102,11 +102,11 @@ def calibrate_on_board(
         )
     p_BQs = np.asarray(config.board().getChessboardCorners(), dtype=float)
     X_WB = _first_guess(views[0], p_BQs, intrinsics)
-    start = np.concatenate([np.zeros(6), _vector(X_WB)])
+    start = np.concatenate([np.zeros(6), step_to(X_WB)])
     owner = np.repeat(np.arange(len(views)), [2 * len(view[1]) for view in views])
 
     def residuals(x: FloatArray) -> FloatArray:
-        X_NC, X_WB = _pose(x[:6]), _pose(x[6:])
+        X_NC, X_WB = pose_of(x[:6]), pose_of(x[6:])
         parts = []
         for X_WC, numbers, uv in views:
             p_CQs = (X_WC @ X_NC).inverse() @ X_WB @ p_BQs[numbers].T
@@ -121,7 +121,7 @@ def calibrate_on_board(
     clusters = np.stack([scores[owner == k].sum(axis=0) for k in range(len(views))])
     covariance = inverse @ clusters.T @ clusters @ inverse
     return HandEye(
-        X_NC=_pose(answer.x[:6]),
+        X_NC=pose_of(answer.x[:6]),
         sigma=np.sqrt(np.diag(covariance)[:6]),
         observed=np.ones(6),
         pictures=len(views),
@@ -136,14 +136,4 @@ def _first_guess(
 ) -> RigidTransform:
     X_WC, numbers, uv = view
     _, turn, shift = cv2.solvePnP(p_BQs[numbers], uv, intrinsics.matrix, None)
-    return X_WC @ _pose(np.concatenate([turn.ravel(), shift.ravel()]))
-
-
-def _pose(step: FloatArray) -> RigidTransform:
-    R = Rotation.from_rotvec(np.array(step[:3])).as_matrix()
-    return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), step[3:])
-
-
-def _vector(X: RigidTransform) -> FloatArray:
-    turn = Rotation.from_matrix(X.rotation().matrix()).as_rotvec()
-    return np.concatenate([turn, X.translation()])
+    return X_WC @ pose_of(np.concatenate([turn.ravel(), shift.ravel()]))

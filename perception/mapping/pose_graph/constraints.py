@@ -5,15 +5,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
-from scipy.spatial.transform import Rotation
+from pydrake.math import RigidTransform
 
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FloatArray, FrozenValue
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.keyframes.keyframe import BLOCK, PointGrid
 from perception.mapping.keyframes.view import Features
-from perception.mapping.pose_graph.poses import skew
+from perception.mapping.pose_graph.poses import pose_of, skew
 
 _LEVER = 0.4
 """Length that makes rotations comparable to displacements, m: half a view."""
@@ -127,9 +126,7 @@ def constraint_by_appearance(
     count = 0 if inliers is None else len(inliers)
     if not found or count < max(config.min_inliers, len(good) // 4):
         return None, count
-    X_ji = RigidTransform(
-        RotationMatrix(Rotation.from_rotvec(turn.ravel()).as_matrix()), shift.ravel()
-    )
+    X_ji = pose_of(np.concatenate([turn.ravel(), shift.ravel()]))
     kept = inliers.ravel()
     X_ij, information = _refine(
         X_ji.inverse(), a, b, first[kept], second[kept], intrinsics, config
@@ -188,8 +185,7 @@ def _refine(
             information += rows.T @ (rows * weight[:, None]) / 2.0
             slope += rows.T @ (errors * weight) / 2.0
         step = -np.linalg.solve(information + 1e-6 * np.eye(6), slope)
-        turn = RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix())
-        X_ij = X_ij @ RigidTransform(turn, step[3:])
+        X_ij = X_ij @ pose_of(step)
     return X_ij, information
 
 
@@ -246,8 +242,7 @@ def constraint_by_geometry(
         )
         step = -np.linalg.pinv(to_kept) @ kept_step / scale
         rms = float(np.sqrt(np.average(e**2, weights=weight)))
-        turn = RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix())
-        X_ij = X_ij @ RigidTransform(turn, step[3:])
+        X_ij = X_ij @ pose_of(step)
         if np.linalg.norm(step * scale) < 2e-5:
             break
     # A quarter of the points are independent, as for planes.

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Self, TypeVar
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
-from scipy.spatial.transform import Rotation
+from pydrake.math import RigidTransform
 
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FloatArray, FrozenValue, IntArray
@@ -25,7 +24,7 @@ from perception.mapping.pose_graph.observability import (
     observed_directions,
     prior_sigmas,
 )
-from perception.mapping.pose_graph.poses import Poses, angle_deg
+from perception.mapping.pose_graph.poses import Poses, angle_deg, pose_of
 from perception.mapping.pose_graph.registration import find_constraints, overlap
 from perception.paper_steps.wall import upright_rotation
 from perception.settings import validate
@@ -174,18 +173,8 @@ class KeyframeGraph(FrozenValue):
 
     def _problem(self, members: Sequence[int]) -> Problem:
         """Returns the members with the older keyframes of their constraints."""
-        constraints = [
-            constraint
-            for k in members
-            for constraint in _of_number(
-                self.constraints, k, lambda constraint: constraint.j
-            )
-        ]
-        sightings = [
-            sighting
-            for k in members
-            for sighting in _of_number(self.sightings, k, lambda sighting: sighting.k)
-        ]
+        constraints = _of_numbers(self.constraints, members, lambda part: part.j)
+        sightings = _of_numbers(self.sightings, members, lambda part: part.k)
         ends = [*members, *(constraint.i for constraint in constraints)]
         numbers = np.unique(np.array(ends, dtype=np.int64))
         settled = None
@@ -285,17 +274,18 @@ class Solution(FrozenValue):
     @property
     def mount(self) -> RigidTransform:
         """The mount's error X_NC: the camera in the nominal camera frame."""
-        turn, shift = self.estimate.mount[:3], self.estimate.mount[3:]
-        R = Rotation.from_rotvec(turn.copy()).as_matrix()
-        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), shift)
+        return pose_of(self.estimate.mount)
 
 
-def _of_number(
-    parts: Sequence[_Part], k: int, number: Callable[[_Part], int]
-) -> Sequence[_Part]:
-    """Returns the parts with number `k` of parts sorted by number."""
-    start = bisect.bisect_left(parts, k, key=number)
-    return parts[start : bisect.bisect_right(parts, k, start, key=number)]
+def _of_numbers(
+    parts: Sequence[_Part], numbers: Sequence[int], key: Callable[[_Part], int]
+) -> list[_Part]:
+    """Returns the parts with some numbers, of parts in ascending order of them."""
+    found: list[_Part] = []
+    for k in numbers:
+        start = bisect.bisect_left(parts, k, key=key)
+        found += parts[start : bisect.bisect_right(parts, k, start, key=key)]
+    return found
 
 
 def _associate(

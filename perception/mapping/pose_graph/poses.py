@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
@@ -102,6 +103,16 @@ class Poses:
             RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
             for R, p in zip(self.R, self.p, strict=True)
         ]
+
+
+def pose_of(step: npt.ArrayLike) -> RigidTransform:
+    """Returns the pose after a (6,) step from the identity."""
+    return Poses.identity(1).moved(np.asarray(step, dtype=float)[None]).list()[0]
+
+
+def step_to(X: RigidTransform) -> FloatArray:
+    """Returns the (6,) step from the identity to a pose."""
+    return np.asarray(Poses.identity(1).steps_to(Poses.of([X]))[0])
 
 
 def angle_deg(R: RotationMatrix) -> float:
