@@ -1,6 +1,6 @@
 """Settings of perception; see `perception.settings`.
 
-Plain mutable dataclasses, so that Drake's `yaml_load_typed` can fill them.
+Plain mutable dataclasses with real types, so that a reader of typed YAML can fill them.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """Settings of planning: tile, tip, raster, scan and motion; see `perception.settings`.
 
-Plain mutable dataclasses, so that Drake's `yaml_load_typed` can fill them.
+Plain mutable dataclasses, filled by `painter.typed_yaml`.
 """
 
 import dataclasses

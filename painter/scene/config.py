@@ -2,7 +2,7 @@
 
 Scene frame S has the axes of the tile frame (x right, y up, z out of the wall towards
 the robot); its origin is the nominal tile's lower-left corner on the wall's surface.
-Plain mutable dataclasses, because Drake's `yaml_load_typed` fills them field by field.
+Plain mutable dataclasses, filled by `painter.typed_yaml`.
 """
 
 import dataclasses
