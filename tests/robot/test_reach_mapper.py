@@ -3,6 +3,7 @@
 import matplotlib.image
 import numpy as np
 import pytest
+from pydrake.multibody.tree import JacobianWrtVariable
 
 from painter.config import Scenario
 from painter.planning.tile import nominal_tile_pose
@@ -55,7 +56,14 @@ def test_the_raster_keeps_its_speed_within_the_joint_limits(mapper):
     V_WG = np.array([0.0, 0.0, 0.0, 0.0, 0.0, scenario.raster.speed])
     # Five joints keep axis and point: the roll about the axis follows by itself and
     # is zero on a plumb wall, so least squares solve the six rows exactly.
-    for jacobian in mapper.arm.gun_jacobian(q):
+    plant = MakeArmPlant(scenario.directives)
+    context = plant.CreateDefaultContext()
+    world, gun = plant.world_frame(), plant.GetFrameByName("gun_nozzle")
+    for q_i in q:
+        plant.SetPositions(context, q_i)
+        jacobian = plant.CalcJacobianSpatialVelocity(
+            context, JacobianWrtVariable.kV, gun, np.zeros(3), world, world
+        )
         v, *_ = np.linalg.lstsq(jacobian, V_WG, rcond=None)
         np.testing.assert_allclose(jacobian @ v, V_WG, atol=1e-9)
         assert np.all(np.abs(v) < 0.9 * mapper.limits.v_max)

@@ -177,32 +177,6 @@ class ArmKinematics(FrozenValue):
         """The same as `solve` for the depth camera, by its origin and viewing axis."""
         return self._solve(p_WC, axis_W, self.X_LC, elbow, shoulder)
 
-    def gun_jacobian(self, q: FloatArray) -> FloatArray:
-        """Jacobian of the nozzle.
-
-        Args:
-            q: (n, 5) rad.
-
-        Returns:
-            (n, 6, 5): rows 0-2 map v (rad/s) to w_WG (rad/s), rows 3-5 to v_WG (m/s),
-            both expressed in W.
-        """
-        q = np.asarray(q, dtype=float)
-        p_WS, p_WE, p_WL = self._joint_points(q)
-        R_WL, _ = self.forward(q)
-        _, p_WG = self.gun_poses(q)
-        zero = np.zeros(len(q))
-        yaw_axis = np.broadcast_to([0.0, 0.0, 1.0], p_WG.shape)
-        pitch_axis = np.stack([-np.sin(q[:, 0]), np.cos(q[:, 0]), zero], axis=-1)
-        axes = np.stack(
-            [yaw_axis, pitch_axis, pitch_axis, pitch_axis, R_WL[:, :, 2]], axis=-1
-        )
-        points = np.stack([p_WS, p_WS, p_WE, p_WL, p_WL], axis=-1)
-        levers = p_WG[:, :, None] - points
-        linear = np.cross(axes, levers, axis=1)
-        jacobian: FloatArray = np.concatenate([axes, linear], axis=1)
-        return jacobian
-
     def travel(self, q: FloatArray) -> FloatArray:
         """Returns the longest way of elbow, wrist, nozzle and camera from row to row.
 
@@ -308,34 +282,3 @@ class ArmKinematics(FrozenValue):
             below[around] = np.mod(below[around], 2.0 * np.pi)
         wrapped: FloatArray = np.pi - below
         return wrapped
-
-
-def wrist_from_motors(angles: FloatArray) -> FloatArray:
-    """Wrist joint positions from the two motor-side angles of the differential.
-
-    The left and the right motor each turn, through a planetary gearbox, a bevel gear
-    on the pitch axis; both mesh with the one on the yaw axis. Turning both the same
-    way pitches the wrist, turning them against each other yaws it.
-
-    Args:
-        angles: (..., 2) rad: left (on +y of the forearm) and right gear about the
-            forearm's +y axis, after the gearboxes.
-
-    Returns:
-        (..., 2) rad: wrist pitch, their mean, and wrist yaw, half of left - right.
-    """
-    left, right = angles[..., 0], angles[..., 1]
-    return np.stack([(left + right) / 2.0, (left - right) / 2.0], axis=-1)
-
-
-def motors_from_wrist(joints: FloatArray) -> FloatArray:
-    """Inverse of `wrist_from_motors`.
-
-    Args:
-        joints: (..., 2) rad: wrist pitch, wrist yaw.
-
-    Returns:
-        (..., 2) rad: left and right gear, pitch + yaw and pitch - yaw.
-    """
-    pitch, yaw = joints[..., 0], joints[..., 1]
-    return np.stack([pitch + yaw, pitch - yaw], axis=-1)

@@ -9,8 +9,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 from painter.planning.arm.kinematics import (
     ArmKinematics,
     ArmLimits,
-    motors_from_wrist,
-    wrist_from_motors,
 )
 
 # z ahead, x right, y down, in a frame whose x is ahead and z up.
@@ -127,22 +125,6 @@ def test_nozzle_and_spray_axis_are_those_of_the_gun_pose():
         np.testing.assert_allclose(arm.spray_axis(q), R_WG[:, :, 2], atol=1e-14)
 
 
-def test_jacobian_is_the_derivative_of_the_nozzle_pose():
-    q = random_positions(50)
-    jacobian = ARM.gun_jacobian(q)
-    step = 1e-6
-    for joint in range(5):
-        delta = np.zeros(5)
-        delta[joint] = step
-        R_up, p_up = ARM.gun_poses(q + delta)
-        R_down, p_down = ARM.gun_poses(q - delta)
-        v_WG = (p_up - p_down) / (2 * step)
-        np.testing.assert_allclose(jacobian[:, 3:, joint], v_WG, atol=1e-8)
-        spin = (R_up - R_down) @ ARM.gun_poses(q)[0].transpose(0, 2, 1) / (2 * step)
-        w_WG = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-        np.testing.assert_allclose(jacobian[:, :3, joint], w_WG, atol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -176,7 +158,15 @@ def test_travel_is_that_of_the_point_of_the_axes_that_moves_farthest():
     p_WLs = ARM.forward(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
     p_WGs = ARM.gun_poses(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
     p_WCs = ARM.camera_poses(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
-    p_WEs = ARM._joint_points(q.reshape(-1, 5))[1].reshape(-1, 2, 3)
+    along = ARM.upper_arm * np.cos(q[..., 1])
+    p_WEs = np.stack(
+        [
+            np.cos(q[..., 0]) * along,
+            np.sin(q[..., 0]) * along,
+            ARM.shoulder_height - ARM.upper_arm * np.sin(q[..., 1]),
+        ],
+        axis=-1,
+    )
     farthest = np.zeros(200)
     for a, b in ((p_WEs, p_WLs), (p_WLs, p_WGs), (p_WLs, p_WCs)):
         for share in np.linspace(0.0, 1.0, 11):
@@ -198,10 +188,3 @@ def test_limits_hold_at_the_bounds_and_never_for_nan():
     limits = ArmLimits(q_min=-one, q_max=one, v_max=one, a_max=one, effort_max=one)
     q = np.array([one, -one, 1.001 * one, np.nan * one])
     np.testing.assert_array_equal(limits.contains(q), [True, True, False, False])
-
-
-def test_differential_wrist_pitches_by_the_mean_and_yaws_by_half_the_difference():
-    motors = np.array([[0.5, 0.5], [0.3, -0.3], [0.9, 0.1]])
-    joints = np.array([[0.5, 0.0], [0.0, 0.3], [0.5, 0.4]])
-    np.testing.assert_allclose(wrist_from_motors(motors), joints, atol=1e-15)
-    np.testing.assert_allclose(motors_from_wrist(joints), motors, atol=1e-15)
