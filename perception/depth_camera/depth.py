@@ -42,14 +42,8 @@ class CameraIntrinsics:
         f = (W / 2) / tan(HFOV / 2), the axis through the middle of the picture.
         """
         focal = config.width / 2 / math.tan(math.radians(config.hfov_deg) / 2)
-        return cls(
-            fx=focal,
-            fy=focal,
-            cx=config.width / 2 - 0.5,
-            cy=config.height / 2 - 0.5,
-            width=config.width,
-            height=config.height,
-        )
+        cx, cy = config.width / 2 - 0.5, config.height / 2 - 0.5
+        return cls(focal, focal, cx, cy, config.width, config.height)
 
     @classmethod
     def from_librealsense(cls, lens: Any) -> Self:
@@ -65,14 +59,7 @@ class CameraIntrinsics:
             raise ValueError(
                 f"the depth stream is distorted ({lens.model}), not rectified"
             )
-        return cls(
-            fx=lens.fx,
-            fy=lens.fy,
-            cx=lens.ppx,
-            cy=lens.ppy,
-            width=lens.width,
-            height=lens.height,
-        )
+        return cls(lens.fx, lens.fy, lens.ppx, lens.ppy, lens.width, lens.height)
 
     @property
     def matrix(self) -> FloatArray:

@@ -85,18 +85,14 @@ def load_segmentation(path: Path) -> WallSegmentation:
             f"{path}: not a segmentation: {error}", code="PNT-SEGMENT-003"
         ) from error
     labels = content["labels"]
-    for name in ("labels", "depth", "wall_mask"):
-        if content[name].ndim != 2 or content[name].shape != labels.shape:
+    for name in ("labels", "depth", "wall_mask", *extras):
+        shape = (content | extras)[name].shape
+        rest = (3,) if name == "normals" else ()
+        if labels.ndim != 2 or shape != (*labels.shape, *rest):
             raise CloudReadError(
-                f"{path}: {name} has shape {content[name].shape}, "
-                f"labels {labels.shape}; both must be (ny, nx).",
+                f"{path}: {name} has shape {shape}, labels {labels.shape}; "
+                "they must be of one grid (ny, nx).",
                 code="PNT-SEGMENT-004",
-            )
-    for name, grid in extras.items():
-        if grid.shape[:2] != labels.shape:
-            raise CloudReadError(
-                f"{path}: {name} has shape {grid.shape}, labels {labels.shape}.",
-                code="PNT-SEGMENT-005",
             )
     matrix = content["X_WT"]
     if matrix.shape != (4, 4) or not _is_rotation(matrix[:3, :3]):
@@ -134,13 +130,12 @@ def _opening_arrays(openings: tuple[Opening, ...]) -> dict[str, npt.NDArray[Any]
     if not openings:
         return {}
     columns = [
-        np.array([opening.kind for opening in openings]),
-        np.array([opening.area for opening in openings]),
-        np.array([opening.depth for opening in openings]),
-        np.array([opening.glass_share for opening in openings]),
-        np.array([opening.p_TVs.shape[1] for opening in openings]),
-        np.concatenate([opening.p_TVs for opening in openings], axis=1),
+        np.array([getattr(opening, name) for opening in openings])
+        for name in ("kind", "area", "depth", "glass_share")
     ]
+    outlines = [opening.p_TVs for opening in openings]
+    columns.append(np.array([outline.shape[1] for outline in outlines]))
+    columns.append(np.concatenate(outlines, axis=1))
     return dict(zip(_OPENINGS, columns, strict=True))
 
 

@@ -147,38 +147,38 @@ def choose_plane(
     limit = config.wall_distance_tolerance
     limit_angle = math.radians(config.wall_angle_tolerance_deg)
     least = config.min_wall_share * total
+    offs = [deviation(plane, X_WT_expected, tile) for plane in planes]
     upright = [
-        plane
-        for plane in planes
+        number
+        for number, plane in enumerate(planes)
         if up_W is None or abs(float(plane.normal @ up_W)) < _LEVEL
     ]
-    offs = {id(plane): deviation(plane, X_WT_expected, tile) for plane in planes}
 
-    def worth(plane: Plane) -> float:
-        return plane.count * math.exp(-2.0 * (offs[id(plane)][0] / limit) ** 2)
+    def worth(number: int) -> float:
+        return planes[number].count * math.exp(-2.0 * (offs[number][0] / limit) ** 2)
 
     good = [
-        plane
-        for plane in upright
-        if abs(offs[id(plane)][0]) <= limit
-        and offs[id(plane)][1] <= limit_angle
-        and plane.count >= least
+        number
+        for number in upright
+        if abs(offs[number][0]) <= limit
+        and offs[number][1] <= limit_angle
+        and planes[number].count >= least
     ]
     good.sort(key=worth, reverse=True)
     for other in good[1:]:
-        apart = abs(offs[id(good[0])][0] - offs[id(other)][0])
+        apart = abs(offs[good[0]][0] - offs[other][0])
         # Closer planes are slices of one uneven wall.
-        if apart > 2.0 * config.distance_threshold:
-            ratio = worth(other) / worth(good[0])
-            if ratio >= _EQUAL:
-                raise AmbiguousWallError(
-                    f"two planes {apart:.3f} m apart are about equally good walls, "
-                    f"{good[0].count / total:.0%} and {other.count / total:.0%} of the "
-                    "points; the expected distance of the wall must tell them apart.",
-                    code="PNT-WALL-005",
-                )
+        is_slice = apart <= 2.0 * config.distance_threshold
+        if not is_slice and worth(other) / worth(good[0]) >= _EQUAL:
+            shares = [planes[number].count / total for number in (good[0], other)]
+            raise AmbiguousWallError(
+                f"two planes {apart:.3f} m apart are about equally good walls, "
+                f"{shares[0]:.0%} and {shares[1]:.0%} of the points; give the wall's "
+                "distance more exactly.",
+                code="PNT-WALL-005",
+            )
     if good:
-        return next(i for i, plane in enumerate(planes) if plane is good[0])
+        return good[0]
     if not planes:
         raise NoWallError(
             f"there is no plane among {total} points.", code="PNT-WALL-006"
@@ -188,11 +188,11 @@ def choose_plane(
             f"all {len(planes)} planes are level, as floors are; none is a wall.",
             code="PNT-WALL-007",
         )
-    largest = max(upright, key=lambda plane: plane.count)
-    distance, angle = offs[id(largest)]
+    number = max(upright, key=lambda number: planes[number].count)
+    largest, (distance, angle) = planes[number], offs[number]
     place = "runs past the tile"
     if math.isfinite(distance):
-        side = "before" if distance > 0 else "behind"
+        side = "in front of" if distance > 0 else "behind"
         place = f"lies {abs(distance):.3f} m {side} the expected wall"
     oblique = abs(distance) <= limit and largest.count >= least
     raise (ObliqueWallError if oblique else NoWallError)(

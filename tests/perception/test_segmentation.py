@@ -163,7 +163,10 @@ def test_non_finite_points_are_dropped():
     [
         (np.zeros((3, 0)), "0 finite points"),
         (np.full((3, 300), np.nan), "0 finite points of 300"),
-        (RigidTransform([0, 0, 0.4]) @ cloud([]), "0.400 m before the expected wall"),
+        (
+            RigidTransform([0, 0, 0.4]) @ cloud([]),
+            "0.400 m in front of the expected wall",
+        ),
         (RigidTransform([9, 0, 0]) @ cloud([]), "no region of 0.005 m² on the 2 x 2 m"),
     ],
 )

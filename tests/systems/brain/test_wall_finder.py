@@ -23,7 +23,7 @@ def make_map(p_WQs):
 
 
 def wall_map(offset=0.0, X_WT=X_WT_EXPECTED):
-    """A wall `offset` m before the expected one."""
+    """A wall `offset` m in front of the expected one."""
     X_WT = X_WT @ RigidTransform([0.0, 0.0, offset])
     rng = np.random.default_rng(0)
     return make_map(synthetic_wall([], spacing=0.02, X_WT=X_WT, rng=rng))
