@@ -77,5 +77,13 @@ def test_wall_out_of_reach_fails_with_its_cause(tmp_path, capsys):
     out = tmp_path / "far"
     words = ["--set", "tile.distance=1.5", "--no-replay"]
     assert run(["simulate", "blank", "--out", str(out), *words]) == 1
-    assert "reach" in capsys.readouterr().err
-    assert (out / INCOMPLETE).exists()
+    message = capsys.readouterr().err
+    assert "reach" in message
+    # The same code everywhere.
+    figures = json.loads((out / "report.json").read_text())
+    events = [json.loads(line) for line in (out / "events.jsonl").open()]
+    (stop,) = (event for event in events if event.get("event") == "stopped")
+    assert figures["code"] == stop["code"]
+    assert figures["cause"] == stop["cause"]
+    for text in (message, (out / INCOMPLETE).read_text()):
+        assert f"[{figures['code']}]" in text
