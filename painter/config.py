@@ -174,6 +174,17 @@ class Scenario:
         for i, zone in enumerate(self.raster.zones):
             for field, bound, x in zone.beyond(self.tile.width, self.tile.height):
                 yield f"raster.zones[{i}].{field}", bound, x
+        stereo = self.wall_camera.stereo
+        nearest = max(stereo.min_range, self.map.min_range)
+        farthest = min(stereo.max_range, self.map.max_range)
+        for name in ("look_distance", "distance"):
+            distance = getattr(self.scan, name)
+            if not nearest < distance <= farthest:
+                bound = (
+                    f"> {nearest:g} m and <= {farthest:g} m, the range of "
+                    "wall_camera.stereo (min_range, max_range) and of map"
+                )
+                yield f"scan.{name}", bound, distance
 
 
 def _read_plant(data: object, _: type) -> MultibodyPlantConfig:

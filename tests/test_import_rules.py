@@ -133,7 +133,8 @@ ROOMS: dict[str, set[str]] = {
     "painter.resources": {"painter_models"},
     "painter.planning.config": set(),
     "painter.planning": PLANNING_VALUES,
-    "painter.planning.arm": PLANNING_VALUES | {"painter.errors"},
+    "painter.planning.arm": PLANNING_VALUES
+    | {"painter.errors", "perception.config", "perception.depth_camera"},
     "painter.planning.clearance": PLANNING_VALUES
     | {"painter.errors", "perception.values"},
     "painter.planning.film": PLANNING_VALUES | {"perception.values"},

@@ -144,9 +144,10 @@ class ScanConfig:
             less far to fold, and to turn from side to side, than from farther off.
         look_time: How long the arm holds still for the first look.
         distance: Camera to wall during the scan; up to a fifth less where the arm
-            cannot fold back so far.
+            cannot fold back so far, but within the camera's range.
         speed: Camera speed on the rows.
-        overlap: Share of an image's height that neighbouring rows share.
+        overlap: Share of an image's height that neighbouring rows share, and least
+            share of its width that neighbouring images of a row do.
         margin: How far beyond the tile's edge the images reach.
         more_looks: Most looks after the scan, into the shadows that it left. Every
             order is tried to find the shortest path.

@@ -1,6 +1,7 @@
 """The planners of a scenario's robot."""
 
 from painter.config import Scenario
+from painter.planning.arm.scan_camera import ScanCamera
 from painter.planning.program.program import ProgramPlanner
 from painter.planning.scan.free_motion import FreeMotionPlanner
 from painter.robot.robot_model import MakeRobotModel, RobotModel
@@ -40,5 +41,11 @@ def MakeFreeMotionPlanner(scenario: Scenario, robot: RobotModel) -> FreeMotionPl
         tile=scenario.tile,
         scan=scenario.scan,
         motion=scenario.motion,
+        camera=ScanCamera.mounted(
+            scenario.wall_camera.stereo,
+            robot.kinematics.X_LC,
+            rate=scenario.wall_camera.rate,
+        ),
         standoff=scenario.raster.standoff,
+        time_limit=scenario.cycle.time_limit,
     )

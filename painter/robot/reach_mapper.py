@@ -14,9 +14,9 @@ from pydrake.math import RigidTransform
 
 from painter.config import Scenario
 from painter.planning.arm.reach_map import ReachTask, TileReach, placement, tile_reach
+from painter.planning.arm.scan_camera import ScanCamera
 from painter.robot.robot_model import MakeRobotModel
 
-VFOV_DEG = 58.0  # Source: Intel RealSense D400 family data sheet, D435 depth, 16:9.
 DISTANCES = np.linspace(0.70, 1.40, 15)
 SHOULDER_HEIGHTS = np.linspace(0.80, 1.60, 9)
 
@@ -39,11 +39,11 @@ class ReachMapper:
         robot = MakeRobotModel(scenario)
         self._checker = robot.checker.Clone()
         self.arm, self.limits = robot.kinematics, robot.limits
-        self.task = ReachTask.make(
+        camera = ScanCamera.mounted(scenario.wall_camera.stereo, self.arm.X_LC)
+        self.task = ReachTask(
             standoff=scenario.raster.standoff,
             scan_distance=scenario.scan.distance,
-            hfov_deg=scenario.wall_camera.stereo.hfov_deg,
-            vfov_deg=VFOV_DEG,
+            footprint=camera.footprint(scenario.scan.distance),
             margin=scenario.scan.margin,
         )
 

@@ -8,12 +8,14 @@ from pydrake.math import RigidTransform
 from pydrake.planning import CollisionChecker
 
 from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.arm.scan_camera import ScanCamera
 from painter.planning.clearance.obstacles import ClearSpace, ObstacleBox, wall_box
 from painter.planning.config import MotionConfig, RasterConfig, TileConfig, TipConfig
 from painter.planning.motion.gun_path import WallIk
 from painter.planning.motion.joint_motion import planning_limits
 from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.program.program import ProgramPlanner
+from painter.planning.scan.camera_poses import CameraPoses
 from painter.planning.tile import nominal_tile_pose
 from painter.robot.arm_model import (
     GetArmKinematics,
@@ -21,7 +23,9 @@ from painter.robot.arm_model import (
     MakeArmPlant,
     MakeCollisionChecker,
 )
+from perception.config import StereoConfig
 from perception.values import WallSegmentation
+from tests.cameras import MOUNTS, write_cell
 
 DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"
 
@@ -43,6 +47,15 @@ class Robot:
         }
         return ProgramPlanner(**(vars(self) | defaults | settings))
 
+    def camera(self, stereo: StereoConfig | None = None) -> ScanCamera:
+        """The camera on the tool, by default the default one."""
+        return ScanCamera.mounted(stereo or StereoConfig(), self.kinematics.X_LC)
+
+    def camera_poses(self, *boxes: ObstacleBox, **settings) -> CameraPoses:
+        """Camera poses before the expected wall, with `boxes` on it."""
+        stereo = settings.pop("stereo", None)
+        return CameraPoses(self.camera(stereo), self.transitions(*boxes, **settings))
+
     def transitions(
         self, *boxes: ObstacleBox, X_WT: RigidTransform | None = None
     ) -> TransitionPlanner:
@@ -63,14 +76,24 @@ class Robot:
         )
 
 
-@pytest.fixture(scope="session")
-def robot() -> Robot:
-    plant = MakeArmPlant(DIRECTIVES)
+def make_robot(directives: str = DIRECTIVES) -> Robot:
+    plant = MakeArmPlant(directives)
     return Robot(
         kinematics=GetArmKinematics(plant),
         limits=GetArmLimits(plant),
-        checker=MakeCollisionChecker(DIRECTIVES, clearance=0.04),
+        checker=MakeCollisionChecker(directives, clearance=0.04),
     )
+
+
+@pytest.fixture(scope="session")
+def robot() -> Robot:
+    return make_robot()
+
+
+@pytest.fixture(scope="session", params=MOUNTS)
+def robot_of_each_mount(request, tmp_path_factory) -> Robot:
+    """The robot with its camera level and turned by a quarter either way."""
+    return make_robot(write_cell(tmp_path_factory.mktemp("cell"), request.param))
 
 
 @pytest.fixture

@@ -28,14 +28,14 @@ def test_the_raster_and_the_scan_lie_within_reach_all_over(mapper):
     X_WT = nominal_tile_pose(scenario.tile)
     is_free = mapper._IsFreeBefore(scenario.tile.distance, 0.0)
     ahead = np.array([1.0, 0.0, 0.0])
-    half_x, half_y = mapper.task.picture_width / 2, mapper.task.picture_height / 2
+    picture = mapper.task.footprint
     margin = scenario.scan.margin
     for solve, x, y, distance in (
         (mapper.arm.solve, (0.06, 1.94), (-0.10, 2.10), 0.30),
         (
             mapper.arm.solve_camera,
-            (half_x - margin, 2.0 + margin - half_x),
-            (half_y - margin, 2.0 + margin - half_y),
+            (picture.left - margin, 2.0 + margin - picture.right),
+            (picture.below - margin, 2.0 + margin - picture.above),
             0.70,
         ),
     ):

@@ -19,6 +19,8 @@ NQ = 5  # Joints of the arm.
 # Largest error of X_LG and X_LC against the form that the closed-form inverse needs.
 _MOUNT_TOLERANCE = 1e-9
 
+JOINT_NAMES = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
+
 # Joint torques (n, 5), N m, for positions, velocities and accelerations, each (n, 5),
 # rad and s.
 TorqueModel = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]

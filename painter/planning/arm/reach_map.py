@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.arm.scan_camera import Footprint
 from painter.planning.config import TileConfig
 from painter.planning.tile import grid_points, nominal_tile_pose
 from perception.ground import BoolArray, FloatArray, FrozenValue
@@ -27,35 +28,14 @@ class ReachTask(FrozenValue):
     Attributes:
         standoff: Nozzle to wall, m.
         scan_distance: Camera to wall, m.
-        picture_width: Width of wall in one picture at that distance, m.
-        picture_height: Height of the same, m.
+        footprint: Wall in one picture at that distance.
         margin: How far pictures have to reach beyond the tile's edge, m.
     """
 
     standoff: float
     scan_distance: float
-    picture_width: float
-    picture_height: float
+    footprint: Footprint
     margin: float
-
-    @classmethod
-    def make(
-        cls,
-        *,
-        standoff: float,
-        scan_distance: float,
-        hfov_deg: float,
-        vfov_deg: float,
-        margin: float,
-    ) -> "ReachTask":
-        """Makes a task from the camera's fields of view, both full angles."""
-        return cls(
-            standoff=standoff,
-            scan_distance=scan_distance,
-            picture_width=2.0 * scan_distance * math.tan(math.radians(hfov_deg) / 2.0),
-            picture_height=2.0 * scan_distance * math.tan(math.radians(vfov_deg) / 2.0),
-            margin=margin,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +106,11 @@ def tile_reach(
         return mask.reshape(shape)
 
     camera_at = reached(arm.solve_camera, task.scan_distance)
-    sees_x = np.abs(x[:, None] - x) <= task.picture_width / 2.0
-    sees_y = np.abs(y[:, None] - y) <= task.picture_height / 2.0
+    picture = task.footprint
+    # Point from camera: y by row and column, x by column and row.
+    dx, dy = x - x[:, None], y[:, None] - y
+    sees_x = (dx >= -picture.left) & (dx <= picture.right)
+    sees_y = (dy >= -picture.below) & (dy <= picture.above)
     return TileReach(
         x=x,
         y=y,

@@ -9,7 +9,6 @@ a time parametriser can fail without saying so.
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -113,21 +112,6 @@ class ToolBlend(FrozenValue):
         return np.asarray(p_TG[0])
 
 
-class ToolPath(Protocol):
-    """What `Pass` and `ToolBlend` have in common."""
-
-    @property
-    def duration(self) -> float:
-        """Length in time, s."""
-
-    @property
-    def knots(self) -> FloatArray:
-        """Times from 0 to `duration`, s; the path is smooth between them."""
-
-    def p_TG(self, time: FloatArray) -> FloatArray:
-        """Returns (n, 3) m, in T, at `time` (n,) s."""
-
-
 @dataclass(frozen=True, eq=False)
 class WallIk(FrozenValue):
     """Inverse kinematics with the gun square to one wall, on one arm configuration.
@@ -221,7 +205,7 @@ class ToolMove(FrozenValue):
         ik: Turns it into joint angles.
     """
 
-    path: ToolPath
+    path: Pass | ToolBlend
     ik: WallIk
 
     @property

@@ -183,6 +183,16 @@ def rest_to_rest(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTrav
     return move
 
 
+def move_times(starts: FloatArray, ends: FloatArray, limits: ArmLimits) -> FloatArray:
+    """Returns how long moves from starts (n, 5) to ends (m, 5), rad, take, (n, m) s.
+
+    Rates and accelerations alone count, which is enough to compare.
+    """
+    return np.array(
+        [[least_travel(a, b, limits).duration for b in ends] for a in starts]
+    )
+
+
 def least_travel(q0: FloatArray, q1: FloatArray, limits: ArmLimits) -> JointTravel:
     """Makes the fastest move within the joints' rates and accelerations alone.
 

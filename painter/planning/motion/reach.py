@@ -5,13 +5,12 @@ import math
 import numpy as np
 
 from painter.errors import ReachError
-from painter.planning.arm.kinematics import ArmLimits
+from painter.planning.arm.kinematics import JOINT_NAMES, ArmLimits
 from painter.planning.motion.gun_path import WallIk
 from perception.ground import FloatArray
 
 _REACH_STEP = 0.05  # m, between the points at which reach is sampled ...
 _STANDOFF_STEP = 0.015  # m, ... and between the stand-offs.
-_JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
 
 def tile_points(width: float, height: float, standoff: float) -> FloatArray:
@@ -100,33 +99,28 @@ def require_reach(
     if not bad.any():
         return q
     arm = ik.kinematics
-    needed = wrist_distances(p_TGs, ik)
-    longest = arm.upper_arm + arm.forearm
-    share = f"{what}: {100 * bad.mean():.0f} % is out of reach"
-    worst = int(np.argmax(np.where(bad, needed, -np.inf)))
-    x, y, z = p_TGs[worst]
-    place = f"T ({x:.2f}, {y:.2f}) m, {z:.2f} m before the wall"
-    if needed[worst] > longest:
-        raise ReachError(
-            f"{share}; {place}, needs {needed[worst]:.2f} m from shoulder to wrist, "
-            f"the arm has {longest:.2f} m.",
-            code="PNT-REACH-002",
-        )
-    worst = int(np.flatnonzero(bad)[0])
-    x, y, z = p_TGs[worst]
-    place = f"T ({x:.2f}, {y:.2f}) m, {z:.2f} m before the wall"
-    if np.isnan(q[worst]).any():
-        raise ReachError(
-            f"{share}; {place}, needs {needed[worst]:.2f} m from shoulder to wrist, "
-            f"the arm cannot fold below {abs(arm.upper_arm - arm.forearm):.2f} m.",
-            code="PNT-REACH-003",
-        )
+    needed = np.where(bad, wrist_distances(p_TGs, ik), -np.inf)
+    worst = int(np.argmax(needed))
+    longest, shortest = arm.upper_arm + arm.forearm, abs(arm.upper_arm - arm.forearm)
+    if needed[worst] <= longest:
+        worst = int(np.argmax(bad))
+    stretch = f"needs {needed[worst]:.2f} m from shoulder to wrist"
     excess = np.maximum(limits.q_min - q[worst], q[worst] - limits.q_max)
     joint = int(np.argmax(excess))
+    if needed[worst] > longest:
+        reason = f"{stretch}, the arm has {longest:.2f} m"
+    elif np.isnan(q[worst]).any():
+        reason = f"{stretch}, the arm cannot fold below {shortest:.2f} m"
+    else:
+        reason = (
+            f"needs {JOINT_NAMES[joint]} at {q[worst, joint]:.2f} rad, its range is "
+            f"{limits.q_min[joint]:.2f} to {limits.q_max[joint]:.2f} rad"
+        )
+    x, y, z = p_TGs[worst]
     raise ReachError(
-        f"{share}; {place}, needs {_JOINTS[joint]} at {q[worst, joint]:.2f} rad, its "
-        f"range is {limits.q_min[joint]:.2f} to {limits.q_max[joint]:.2f} rad.",
-        code="PNT-REACH-004",
+        f"{what}: {100 * bad.mean():.0f} % is out of reach; T ({x:.2f}, {y:.2f}) m, "
+        f"{z:.2f} m before the wall, {reason}.",
+        code="PNT-REACH-002",
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from painter.errors import MotionLimitError
-from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.arm.kinematics import JOINT_NAMES, ArmKinematics, ArmLimits
 from painter.planning.clearance.obstacles import ClearSpace
 from painter.planning.motion.surface_frame import SurfaceFrame
 from painter.planning.spray_path import Motion, PaintProgram
@@ -22,7 +22,6 @@ _RATE_TOLERANCE = 1.05
 _CLEARANCE_TOLERANCE = 0.001  # m
 _TORQUE_STEP = 0.02  # s, between the samples checked for torque.
 _CLEARANCE_STEP = 0.03  # m of arm travel between clearance checks.
-_JOINTS = ("base yaw", "shoulder pitch", "elbow pitch", "wrist pitch", "wrist yaw")
 
 
 def verify_motion(
@@ -226,7 +225,7 @@ def _require_within(
     worst = np.unravel_index(int(np.argmax(excess)), size.shape)
     if excess[worst] <= 1.0:
         return
-    joint = f" of {_JOINTS[worst[1]]}" if size.shape[1:] == (5,) else ""
+    joint = f" of {JOINT_NAMES[worst[1]]}" if size.shape[1:] == (5,) else ""
     raise MotionLimitError(
         f"{what}{joint} is {size[worst]:.4g} {unit} at {time[worst[0]]:.3f} s, "
         f"the limit is {bounds[worst]:.4g} {unit}.",

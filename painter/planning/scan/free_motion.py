@@ -1,5 +1,6 @@
 """Gun-off motions of the cycle: home, first look, scan, retract."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ from pydrake.planning import CollisionChecker
 
 from painter.errors import CollisionError
 from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
+from painter.planning.arm.scan_camera import ScanCamera
 from painter.planning.clearance.obstacles import ClearSpace, wall_box
 from painter.planning.config import (
     MotionConfig,
@@ -21,8 +23,10 @@ from painter.planning.motion.joint_motion import Segment, chain, planning_limits
 from painter.planning.motion.reach import require_reach, tile_points
 from painter.planning.motion.transitions import TransitionPlanner
 from painter.planning.motion.verify import verify_motion
+from painter.planning.scan.camera_poses import CameraPoses
+from painter.planning.scan.first_look import look_segments
 from painter.planning.scan.more_looks import more_looks
-from painter.planning.scan.scan_path import look_segments, scan_segments
+from painter.planning.scan.scan_path import check_scan, scan_segments
 from painter.planning.spray_path import Motion
 from perception.fine_steps.shadows import Relief
 from perception.ground import FloatArray
@@ -41,7 +45,9 @@ class FreeMotionPlanner:
         tile: Size of the tile and its expected pose.
         scan: Settings of first look, scan and more looks.
         motion: Settings of the motion.
+        camera: On the tool.
         standoff: Of the gun when it paints, m.
+        time_limit: Of the whole cycle, s.
     """
 
     kinematics: ArmKinematics
@@ -50,14 +56,17 @@ class FreeMotionPlanner:
     tile: TileConfig
     scan: ScanConfig
     motion: MotionConfig
+    camera: ScanCamera
     standoff: float = RasterConfig.standoff
+    time_limit: float = math.inf
 
     def plan(self, goal: str, q0: FloatArray, X_WT: RigidTransform) -> Motion:
         """Plans a motion of the cycle.
 
         Until the wall has been scanned the arm keeps `motion.wall_keepout` and the
-        clearance from it. "look" and "scan" first check that the gun reaches the whole
-        tile, so that a job that cannot be done ends at once.
+        clearance from it. "look" and "scan" first check the scan's settings against the
+        camera, and that the gun reaches the whole tile, so that a job that cannot be
+        done ends at once.
 
         Args:
             goal: "home" or "retract": to the home pose; "look": over two quarters of
@@ -70,6 +79,7 @@ class FreeMotionPlanner:
 
         Raises:
             ValueError: There is no such goal.
+            InputError: The camera cannot scan the tile with these settings.
             ReachError: The tile, or the wall, is out of the arm's reach.
             CollisionError: There is no clear route.
             MotionLimitError: The finished motion fails its verification.
@@ -82,14 +92,16 @@ class FreeMotionPlanner:
             what = f"tile of {tile.width:.2f} x {tile.height:.2f} m"
             ik = WallIk(self.kinematics, X_WT)
             require_reach(points, ik=ik, limits=self.limits, what=what)
+            check_scan(tile, self.scan, self.camera, time_limit=self.time_limit)
         # After painting or a stop the gun may be within the keepout.
         keepouts = (0.0,) if goal == "retract" else (self.motion.wall_keepout, 0.0)
         transitions = self._transition_planner(q0, X_WT, keepouts)
         path: Sequence[Segment]
+        poses = CameraPoses(self.camera, transitions)
         if goal == "scan":
-            path = scan_segments(q0, tile, self.scan, transitions)
+            path = scan_segments(q0, tile, self.scan, poses, time_limit=self.time_limit)
         elif goal == "look":
-            path = look_segments(q0, tile, self.scan, transitions)
+            path = look_segments(q0, tile, self.scan, poses)
         else:
             path = transitions.free_motion(q0, transitions.q_home)
         return self._verified(path, transitions.space, what=f"motion {goal!r}")
@@ -122,7 +134,8 @@ class FreeMotionPlanner:
             transitions = self._transition_planner(q0, X_WT, (keepout,))
         except CollisionError:
             return None
-        path = more_looks(q0, relief, self.scan, transitions)
+        poses = CameraPoses(self.camera, transitions)
+        path = more_looks(q0, relief, self.scan, poses)
         if not path:
             return None
         return self._verified(path, transitions.space, what="motion 'more looks'")

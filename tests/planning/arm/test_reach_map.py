@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from painter.planning.arm.kinematics import ArmKinematics, ArmLimits
 from painter.planning.arm.reach_map import ReachTask, placement, tile_reach
+from painter.planning.arm.scan_camera import Footprint
 from painter.planning.config import TileConfig
 
 R_AHEAD = RotationMatrix([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -26,18 +27,13 @@ WIDE = ArmLimits(
     effort_max=np.ones(5),
 )
 TILE = TileConfig(width=2.0, height=2.0, bottom=0.2, distance=1.0)
-TASK = ReachTask.make(
-    standoff=0.3, scan_distance=0.5, hfov_deg=90.0, vfov_deg=90.0, margin=0.0
-)
+# At 0.5 m with 90 x 90 deg.
+PICTURE = Footprint(left=0.5, right=0.5, below=0.5, above=0.5)
+TASK = ReachTask(standoff=0.3, scan_distance=0.5, footprint=PICTURE, margin=0.0)
 
 
 def everywhere(q):
     return np.ones(len(q), dtype=bool)
-
-
-def test_a_picture_spans_twice_the_distance_at_90_degrees():
-    assert TASK.picture_width == pytest.approx(1.0)
-    assert TASK.picture_height == pytest.approx(1.0)
 
 
 def test_sprayed_is_a_disc_around_the_shoulder():
@@ -57,6 +53,23 @@ def test_pictures_reach_half_their_size_beyond_the_camera():
     # The camera's disc has the radius sqrt(1 - 0.4²) = 0.917 m, a picture 0.5 m more.
     assert not reach.camera_at[0, 20] and reach.seen[0, 20]
     assert reach.scan_share == 1.0
+
+
+def test_a_picture_without_a_left_half_shows_nothing_to_the_left():
+    """The base yaw is bound so that the camera stays within 4 cm of the middle."""
+    ahead = WIDE.replace(
+        q_min=np.array([-0.1, *[-math.pi] * 4]), q_max=np.array([0.1, *[math.pi] * 4])
+    )
+    task = TASK.replace(footprint=PICTURE.replace(left=0.0, below=0.1))
+    reach = tile_reach(ARM, ahead, TILE, task, is_free=everywhere)
+    cameras_y, cameras_x = np.nonzero(reach.camera_at)
+    seen_y, seen_x = np.nonzero(reach.seen)
+    left = (reach.x[cameras_x].min() - reach.x[seen_x]).max()
+    right = (reach.x[seen_x] - reach.x[cameras_x].max()).max()
+    below = (reach.y[cameras_y].min() - reach.y[seen_y]).max()
+    above = (reach.y[seen_y] - reach.y[cameras_y].max()).max()
+    np.testing.assert_allclose([left, right], [0.0, 0.5], atol=1e-9)
+    assert below <= 0.1 + 1e-9 and above <= 0.5 + 1e-9
 
 
 def test_joint_limits_and_collisions_take_away():

@@ -18,7 +18,12 @@ FOLDED = np.array([0.0, -1.9, 2.6, -0.7, 0.0])
 def plan(robot, goal, q0, *, tile=None, X_WT=None):
     tile = tile or TileConfig()
     planner = FreeMotionPlanner(
-        **vars(robot), tile=tile, scan=ScanConfig(), motion=MOTION, standoff=0.3
+        **vars(robot),
+        tile=tile,
+        scan=ScanConfig(),
+        motion=MOTION,
+        camera=robot.camera(),
+        standoff=0.3,
     )
     return planner.plan(goal, q0, X_WT or nominal_tile_pose(tile))
 

@@ -6,6 +6,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
+from painter.planning.arm.scan_camera import ScanCamera
 from painter.planning.config import MotionConfig, ScanConfig, TileConfig
 from painter.planning.motion.gun_path import WallIk
 from painter.planning.scan.free_motion import FreeMotionPlanner
@@ -19,6 +20,7 @@ from painter.robot.arm_model import (
 )
 from painter.systems.brain.motion_planner import MotionPlanner
 from painter.systems.values import StageRequest, StageResult
+from perception.config import StereoConfig
 from perception.values import SurfaceMap, Wall
 
 DIRECTIVES = "package://painter_models/painter_cell.dmd.yaml"
@@ -27,13 +29,15 @@ HOME = np.deg2rad(MotionConfig().home_deg)
 
 def make_planner(**tile):
     plant = MakeArmPlant(DIRECTIVES)
+    kinematics = GetArmKinematics(plant)
     planner = FreeMotionPlanner(
-        kinematics=GetArmKinematics(plant),
+        kinematics=kinematics,
         limits=GetArmLimits(plant),
         checker=MakeCollisionChecker(DIRECTIVES, clearance=0.04),
         tile=TileConfig(**tile),
         scan=ScanConfig(),
         motion=MotionConfig(),
+        camera=ScanCamera.mounted(StereoConfig(), kinematics.X_LC),
     )
     return MotionPlanner(planner=planner, period=0.1)
 
