@@ -24,8 +24,8 @@ _EXPECTED = {
     str: "text",
     bool: "true or false",
 }
-# PyYAML reads a number without a point, such as 1e-5, as text; YAML 1.2 does not.
-_EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+")
+# PyYAML reads 1e-5 (no point) and 1.5e5 (no sign) as text; YAML 1.2 does not.
+_EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
 CONVERTER = cattrs.Converter()
 """Builds the values; a module may register how further types are read."""
 

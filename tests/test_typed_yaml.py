@@ -42,12 +42,12 @@ def test_values_have_the_types_of_their_fields():
     assert isinstance(whole.parts["a"].colour, Colour)
 
 
-def test_a_number_without_a_point_is_a_number():
-    """YAML 1.2, 10.3.2; PyYAML reads 1.1, where 1e-5 is text."""
-    data = yaml.safe_load("{parts: {a: {size: 1e-5}}, corners: [[1e3, -2E+1]]}")
+def test_numbers_with_an_exponent_are_numbers():
+    """YAML 1.2, 10.3.2; PyYAML reads 1.1, where 1e-5 and 1.5e5 are text."""
+    data = yaml.safe_load("{parts: {a: {size: 1e-5}}, corners: [[1e3, -2E+1, 1.5e5]]}")
     whole = read_typed(Whole, data)
     assert whole.parts["a"].size == 1e-5
-    assert whole.corners == [[1000.0, -20.0]]
+    assert whole.corners == [[1000.0, -20.0, 150000.0]]
 
 
 def test_a_key_without_a_value_has_no_fields():
