@@ -57,7 +57,8 @@ def main() -> None:
         marks.append(time.perf_counter())
         for name, duration in zip(names, np.diff(marks), strict=True):
             seconds[name].append(1000 * duration)
-    print(f"{stereo.width} x {stereo.height} px, {voxels.keys.size} voxels at the end")
+    count = voxels.voxels.keys.size
+    print(f"{stereo.width} x {stereo.height} px, {count} voxels at the end")
     for name, durations in seconds.items():
         low, high = np.median(durations), np.max(durations)
         print(f"{name:>20}: median {low:5.1f} ms, worst {high:5.1f} ms")

@@ -1,6 +1,5 @@
 """Fuses keyframes into one surface, weighted and counted, without outliers."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +13,9 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 from perception.io.ply import write_ply
 from perception.mapping.config import MapperConfig
+from perception.mapping.fusion.voxels import Voxels, normals_of
 from perception.mapping.keyframes.keyframe import BLOCK, Keyframe
 
-_REACH = 1 << 20
-"""Voxels along each axis, to either side: 5 km at 5 mm."""
-_BATCH = 8
-"""Keyframes whose voxels are added to the map at once."""
 _MIN_COUNT = 3
 _OUTLIER_SHARE = 0.2
 """Voxels with less than this share of the best voxel around them are outliers."""
@@ -77,30 +73,25 @@ def fuse(
         intrinsics: Of the camera.
         config: Voxel size and stride.
     """
-    keys, sums = np.zeros(0, np.int64), np.zeros((11, 0))
-    pending: list[tuple[IntArray, FloatArray]] = []
+    X_VW = X_WV.inverse()
+    voxels = Voxels.empty(config.cell, config.layer, colored=True)
     for keyframe, X_WC in zip(keyframes, poses, strict=True):
-        pending.append(_voxels(keyframe, X_WV.inverse() @ X_WC, intrinsics, config))
-        if len(pending) == _BATCH:
-            keys, sums = _add([(keys, sums), *pending])
-            pending = []
-    keys, sums = _join_layers(*_add([(keys, sums), *pending]), config.layer)
-    real = _real(keys, sums)
-    sums = sums[:, real]
-    mean = sums[1:5] / sums[0]
-    p_VQs = mean[:3]
-    open_air = _seen_through(X_WV @ p_VQs, keyframes, poses, intrinsics)
-    sums, mean, p_VQs = sums[:, ~open_air], mean[:, ~open_air], p_VQs[:, ~open_air]
-    p_WQs = X_WV @ p_VQs if p_VQs.size else np.zeros((3, 0))
+        p_CQs, weights, colors = _pixels(keyframe, intrinsics)
+        X_VC = X_VW @ X_WC
+        voxels = voxels.add(X_VC @ p_CQs, X_VC.translation(), weights, colors)
+    surface = voxels.surface(_MIN_COUNT, _OUTLIER_SHARE)
+    carved = _seen_through(X_WV @ surface.p_VQs, keyframes, poses, intrinsics)
+    surface = surface.selected(~carved)
+    p_WQs = X_WV @ surface.p_VQs
     return FusedMap(
         p_WQs=p_WQs,
-        normals_W=_normals(p_WQs, X_WV.rotation().matrix()[:, 2], 3.0 * config.cell),
-        colors=np.rint(sums[5:8] / sums[8]).T.astype(np.uint8),
-        counts=sums[8].astype(np.int64),
-        frames=sums[9].astype(np.int64),
-        variances=np.maximum(mean[3] - mean[2] ** 2, 0.0),
+        normals_W=normals_of(p_WQs, X_WV @ surface.p_VCs, 3.0 * config.cell),
+        colors=surface.colors,
+        counts=surface.counts,
+        frames=surface.frames,
+        variances=surface.variances,
         X_WV=X_WV,
-        carved=int(open_air.sum()),
+        carved=int(carved.sum()),
     )
 
 
@@ -181,72 +172,6 @@ def _pixels(
     return np.stack([x * z, y * z, z]), weights, picture.colors[row, column]
 
 
-def _voxels(
-    keyframe: Keyframe,
-    X_VC: RigidTransform,
-    intrinsics: CameraIntrinsics,
-    config: MapperConfig,
-) -> tuple[IntArray, FloatArray]:
-    """Returns a keyframe's voxels, sorted, and their sums.
-
-    The rows of the sums: weight, weighted x, y, z and z², red, green, blue, pixels,
-    frames, layer.
-    """
-    p_CQs, weights, colors = _pixels(keyframe, intrinsics)
-    p_VQs = X_VC @ p_CQs if p_CQs.size else p_CQs
-    size = np.array([config.cell, config.cell, config.layer])[:, None]
-    i, j, k = np.floor(p_VQs / size + [[0.0], [0.0], [0.5]]).astype(np.int64) + _REACH
-    keys, index = np.unique((i * 2 * _REACH + j) * 2 * _REACH + k, return_inverse=True)
-    z = p_VQs[2]
-    rows = [weights, *(weights * p_VQs), weights * z * z, *colors.T]
-    sums = [np.bincount(index, row, keys.size) for row in rows]
-    counts = np.bincount(index, minlength=keys.size).astype(float)
-    return keys, np.stack([*sums, counts, np.ones(keys.size), keys * 0.0])
-
-
-def _add(parts: list[tuple[IntArray, FloatArray]]) -> tuple[IntArray, FloatArray]:
-    keys = np.concatenate([part[0] for part in parts])
-    if not keys.size:
-        return keys, np.zeros((11, 0))
-    order = np.argsort(keys, kind="stable")
-    keys = keys[order]
-    first = np.flatnonzero(np.concatenate([[True], np.diff(keys) > 0]))
-    sums = np.concatenate([part[1] for part in parts], axis=1)[:, order]
-    return keys[first], np.add.reduceat(sums, first, axis=1)
-
-
-def _join_layers(
-    keys: IntArray, sums: FloatArray, layer: float
-) -> tuple[IntArray, FloatArray]:
-    """Joins voxels on top of each other whose means are closer than half a layer."""
-    if not keys.size:
-        return keys, sums
-    z = sums[3] / sums[0]
-    apart = (np.diff(keys) > 1) | (np.diff(z) > layer / 2)
-    first = np.flatnonzero(np.concatenate([[True], apart]))
-    joined = np.add.reduceat(sums, first, axis=1)
-    joined[9] = np.maximum.reduceat(sums[9], first)
-    return keys[first], joined
-
-
-def _real(keys: IntArray, sums: FloatArray) -> BoolArray:
-    """Finds voxels with enough pixels and frames; see `VoxelMap.surface_map`."""
-    if not keys.size:
-        return np.zeros(0, dtype=np.bool_)
-    columns, index = np.unique(keys // (2 * _REACH), return_inverse=True)
-    real = sums[8] >= _MIN_COUNT
-    for row in (8, 9):
-        own = np.zeros(columns.size)
-        np.maximum.at(own, index, sums[row])
-        best = own.copy()
-        for i, j in itertools.product((-1, 0, 1), repeat=2):
-            beside = columns + i * 2 * _REACH + j
-            place = np.minimum(np.searchsorted(columns, beside), columns.size - 1)
-            best = np.maximum(best, np.where(columns[place] == beside, own[place], 0.0))
-        real &= sums[row] >= _OUTLIER_SHARE * best[index]
-    return np.asarray(real)
-
-
 def _seen_through(
     p_WQs: FloatArray,
     keyframes: Sequence[Keyframe],
@@ -256,8 +181,6 @@ def _seen_through(
     """Finds points that more keyframes see through than see."""
     through = np.zeros(p_WQs.shape[1], dtype=np.int32)
     seen = np.zeros_like(through)
-    if not p_WQs.size:
-        return through > 0
     for keyframe, X_WC in list(zip(keyframes, poses, strict=True))[::_CARVERS]:
         picture = keyframe.picture
         if picture is None:
@@ -275,12 +198,3 @@ def _seen_through(
         through[ahead] += depth > z_in + margin
         seen[ahead] += np.abs(depth - z_in) <= margin
     return np.asarray((through >= 2) & (through > seen))
-
-
-def _normals(p_WQs: FloatArray, towards_W: FloatArray, radius: float) -> FloatArray:
-    if not p_WQs.size:
-        return np.zeros((3, 0))
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p_WQs.T))
-    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius, 30))
-    cloud.orient_normals_to_align_with_direction(towards_W)
-    return np.asarray(cloud.normals).T.copy()

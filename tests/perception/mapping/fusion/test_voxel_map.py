@@ -48,20 +48,20 @@ def test_fusing_in_two_parts_equals_fusing_at_once():
     both = make_map().fuse(p_WQs, p_WC)
     first = make_map().fuse(p_WQs[:, 1::2], p_WC)
     parts = first.fuse(p_WQs[:, ::2], p_WC)
-    np.testing.assert_array_equal(parts.keys, both.keys)
-    np.testing.assert_array_equal(parts.counts, both.counts)
-    np.testing.assert_allclose(parts.sums, both.sums, atol=1e-12)
-    assert (np.diff(parts.keys) > 0).all()
-    assert parts.counts.sum() == 5000
-    assert parts.frames.max() == 2
-    assert first.counts.sum() == 2500  # It stayed as it was.
+    np.testing.assert_array_equal(parts.voxels.keys, both.voxels.keys)
+    np.testing.assert_array_equal(parts.voxels.counts, both.voxels.counts)
+    np.testing.assert_allclose(parts.voxels.p_VQs, both.voxels.p_VQs, atol=1e-12)
+    assert (np.diff(parts.voxels.keys) > 0).all()
+    assert parts.voxels.counts.sum() == 5000
+    assert parts.voxels.frames.max() == 2
+    assert first.voxels.counts.sum() == 2500  # It stayed as it was.
 
 
 def test_points_outside_the_box_are_left_out():
     dut = make_map(margin=0.1, depth_range=0.5, min_count=1)
     inside = [[-0.09, 0.5, 0.0], [1.09, 0.5, 0.0], [0.5, -0.09, 0.0], [0.5, 0.5, 0.49]]
     outside = [[-0.11, 0.5, 0.0], [1.11, 0.5, 0.0], [0.5, 1.11, 0.0], [0.5, 0.5, -0.52]]
-    assert dut.fuse(in_W(inside + outside), p_WC).counts.sum() == len(inside)
+    assert dut.fuse(in_W(inside + outside), p_WC).voxels.counts.sum() == len(inside)
 
 
 def test_an_empty_map_has_an_empty_surface():
