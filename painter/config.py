@@ -6,7 +6,6 @@ checks every value; see `perception.settings`.
 
 import dataclasses
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -15,6 +14,7 @@ from pydrake.multibody.plant import MultibodyPlantConfig
 
 from painter.camera.config import CameraDriverConfig
 from painter.errors import InputError
+from painter.named_yaml import read_named
 from painter.planning.config import (
     MotionConfig,
     RasterConfig,
@@ -22,7 +22,7 @@ from painter.planning.config import (
     TileConfig,
     TipConfig,
 )
-from painter.resources import models_path, named_scenarios
+from painter.resources import named_scenarios
 from painter.typed_yaml import CONVERTER, read_typed
 from perception.config import MapConfig, SegmentationConfig, StereoConfig
 from perception.mapping.config import PoseGraphConfig
@@ -196,7 +196,7 @@ def _read_plant(data: object, _: type) -> MultibodyPlantConfig:
             defaults=Scenario().plant_config,
         )
     except (RuntimeError, ValueError, TypeError, AssertionError) as error:
-        raise ValueError(f"cannot be read: {_one_line(error)}") from error
+        raise ValueError(f"cannot be read: {' '.join(str(error).split())}") from error
 
 
 CONVERTER.register_structure_hook(MultibodyPlantConfig, _read_plant)
@@ -218,45 +218,14 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         InputError: There is no such scenario, a key is unknown or a value is out of
             bounds; names the file, the field, the value and the bound.
     """
-    path = Path(name)
-    if path.suffix not in (".yaml", ".yml"):
-        path = models_path("scenarios", f"{name}.scenario.yaml")
-        if not path.is_file():
-            known = ", ".join(named_scenarios())
-            raise InputError(
-                f"scenario {name!r} is unknown; known are: {known}.",
-                code="PNT-SCENARIO-001",
-            )
-    try:
-        document = yaml.safe_load(path.read_text())
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: no such scenario file.", code="PNT-SCENARIO-002"
-        ) from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(
-            f"{path}: {_one_line(error)}", code="PNT-SCENARIO-003"
-        ) from error
-    if not isinstance(document, dict) or len(document) != 1:
-        raise InputError(
-            f"{path}: expected one top key, the scenario's name.",
-            code="PNT-SCENARIO-004",
-        )
-    ((top, fields),) = document.items()
-    if not isinstance(fields, dict | None):
-        raise InputError(
-            f"{path}: expected fields below {top!r}, got {fields!r}.",
-            code="PNT-SCENARIO-005",
-        )
-    fields = dict(fields or {})
-    fields.setdefault("name", str(top))
+    path, fields = read_named("scenario", name, named_scenarios())
     for override in overrides:
         _override(fields, override)
     try:
         scenario = read_typed(Scenario, fields)
         validate(scenario)
     except ValueError as error:
-        raise InputError(f"{path}: {error}", code="PNT-SCENARIO-006") from error
+        raise InputError(f"{path}: {error}", code="PNT-SCENARIO-001") from error
     return scenario
 
 
@@ -270,7 +239,7 @@ def _override(fields: dict[str, Any], override: str) -> None:
     key, separator, text = override.partition("=")
     if not separator or not key:
         raise InputError(
-            f"--set {override!r}: expected key=value.", code="PNT-SCENARIO-007"
+            f"--set {override!r}: expected key=value.", code="PNT-SCENARIO-002"
         )
     *parents, last = key.split(".")
     for parent in parents:
@@ -278,15 +247,12 @@ def _override(fields: dict[str, Any], override: str) -> None:
         if not isinstance(fields, dict):
             raise InputError(
                 f"--set {override!r}: {parent!r} has no fields.",
-                code="PNT-SCENARIO-008",
+                code="PNT-SCENARIO-003",
             )
     try:
         fields[last] = yaml.safe_load(text)
     except yaml.YAMLError as error:
+        reason = " ".join(str(error).split())
         raise InputError(
-            f"--set {override!r}: {_one_line(error)}", code="PNT-SCENARIO-009"
+            f"--set {override!r}: {reason}", code="PNT-SCENARIO-004"
         ) from error
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

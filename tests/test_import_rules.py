@@ -131,6 +131,7 @@ ROOMS: dict[str, set[str]] = {
     "painter.timebase": set(),
     "painter.typed_yaml": set(),
     "painter.resources": {"painter_models"},
+    "painter.named_yaml": {"painter.errors", "painter.resources"},
     "painter.planning.config": set(),
     "painter.planning": PLANNING_VALUES,
     "painter.planning.arm": PLANNING_VALUES
@@ -169,12 +170,18 @@ ROOMS: dict[str, set[str]] = {
         "painter.camera.config",
         "painter.errors",
         "painter.planning.config",
+        "painter.named_yaml",
         "painter.resources",
         "painter.typed_yaml",
         "perception.config",
         "perception.mapping.config",
     },
-    "painter.scene": {"painter.errors", "painter.resources", "painter.typed_yaml"},
+    "painter.scene": {
+        "painter.errors",
+        "painter.named_yaml",
+        "painter.resources",
+        "painter.typed_yaml",
+    },
     "painter.canopen": set(),
     "painter.canopen.protocol": {"painter.errors"},
     "painter.canopen.config": {
@@ -368,6 +375,7 @@ PYDRAKE: dict[str, set[str]] = {
     "painter.canopen": set(),
     "painter.errors": set(),
     "painter.timebase": set(),
+    "painter.named_yaml": set(),
     "painter.typed_yaml": set(),
 }
 

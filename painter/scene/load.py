@@ -1,11 +1,9 @@
 """Reading scenes: by name, from a file, or drawn from a seed."""
 
-from pathlib import Path
-
-import yaml
 from pydrake.common.yaml import yaml_dump_typed
 
 from painter.errors import InputError
+from painter.named_yaml import read_named
 from painter.resources import models_path
 from painter.scene.config import Scene
 from painter.scene.random_scene import draw_random_scene
@@ -38,34 +36,12 @@ def load_scene(name: str, seed: int) -> Scene:
     """
     if name == "random":
         return draw_random_scene(seed)
-    path = Path(name)
-    if path.suffix not in (".yaml", ".yml"):
-        path = models_path("scenes", f"{name}{_SUFFIX}")
-        if not path.is_file():
-            known = ", ".join([*named_scenes(), "random"])
-            raise InputError(
-                f"scene {name!r} is unknown; known are: {known}.", code="PNT-SCENE-001"
-            )
-    try:
-        document = yaml.safe_load(path.read_text())
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such scene file.", code="PNT-SCENE-002") from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(
-            f"{path}: {' '.join(str(error).split())}", code="PNT-SCENE-003"
-        ) from error
-    if not isinstance(document, dict) or len(document) != 1:
-        raise InputError(
-            f"{path}: expected one top key, the scene's name.", code="PNT-SCENE-004"
-        )
-    ((top, fields),) = document.items()
-    if isinstance(fields, dict | None):
-        fields = {"name": str(top)} | (fields or {})
+    path, fields = read_named("scene", name, [*named_scenes(), "random"])
     try:
         scene = read_typed(Scene, fields)
         validate(scene)
     except ValueError as error:
-        raise InputError(f"{path}: {error}", code="PNT-SCENE-005") from error
+        raise InputError(f"{path}: {error}", code="PNT-SCENE-001") from error
     return scene
 
 

@@ -53,7 +53,7 @@ def test_empty_scene_is_the_default_wall(tmp_path: Path):
         ("a: {colour: 3}", "colour is unknown; known are: name, "),
         ("a: {wall: {widht: 3.0}}", r"wall\.widht is unknown"),
         ("a: {wall: 3}", "wall must have fields, got 3"),
-        ("a: 3", "file must have fields, got 3"),
+        ("a: 3", "expected fields below 'a', got 3"),
         ("a: {openings: [{x: left}]}", r"openings\[0\]\.x must be a number"),
         ("a: {openings: 3}", "openings must be a list, got 3"),
         ("a: {openings: [{vertical_bars: 1.5}]}", "must be a whole number, got 1.5"),
