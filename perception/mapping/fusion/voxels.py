@@ -184,6 +184,8 @@ def normals_of(p_WQs: FloatArray, p_WCs: FloatArray, radius: float) -> FloatArra
     Returns:
         (3, N) unit normals in W that face the cameras.
     """
+    if not p_WQs.size:
+        return np.zeros((3, 0))  # Open3D would warn of it on stdout.
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p_WQs.T))
     cloud.estimate_normals(
         o3d.geometry.KDTreeSearchParamHybrid(radius=radius, max_nn=_NORMAL_NEIGHBORS)

@@ -64,11 +64,12 @@ def test_points_outside_the_box_are_left_out():
     assert dut.fuse(in_W(inside + outside), p_WC).voxels.counts.sum() == len(inside)
 
 
-def test_an_empty_map_has_an_empty_surface():
+def test_an_empty_map_has_an_empty_surface_and_prints_nothing(capfd):
     for dut in (make_map(), make_map().fuse(np.zeros((3, 0)), p_WC)):
         assert isinstance(dut.surface_map, SurfaceMap)
         assert dut.surface_map.p_WQs.shape == (3, 0)
     assert dut.frame_count == dut.surface_map.frames == 1
+    assert capfd.readouterr() == ("", "")  # `--json` is alone on stdout.
 
 
 def test_a_surface_on_the_border_of_two_layers_is_one_point_a_column():
