@@ -7,14 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.cli.common import (
-    JsonOption,
-    OutOption,
-    ScenarioOption,
-    SetOption,
-    output_folder,
-    print_result,
-)
+from painter.cli import options
+from painter.cli.common import output_folder, print_result
 from painter.errors import InputError
 from perception.settings import validate
 
@@ -46,11 +40,11 @@ BoardOption = Annotated[
 
 def calibrate(
     frames: FramesArgument,
-    out: OutOption,
+    out: options.Out,
     board: BoardOption = None,
-    scenario: ScenarioOption = "blank",
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
+    scenario: options.Scenario = "blank",
+    overrides: options.Set = None,
+    as_json: options.Json = False,
 ) -> None:
     """Calibrate the camera's mount from pictures and joint positions.
 

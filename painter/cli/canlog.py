@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from painter.canopen.analysis.kinds import Kind
-from painter.cli.common import BusOption, JsonOption, output_folder, print_result
-from painter.resources import models_path
+from painter.cli import options
+from painter.cli.common import output_folder, print_result, read_bus
 
 if TYPE_CHECKING:
     from painter.canopen.analysis.decoder import Decoded
@@ -58,7 +58,7 @@ ReplayOption = Annotated[
 
 def canlog(
     log: LogArgument,
-    bus_file: BusOption = None,
+    bus_file: options.Bus = None,
     changes: ChangesOption = False,
     nodes: NodeOption = None,
     kinds: KindOption = None,
@@ -66,7 +66,7 @@ def canlog(
     until: UntilOption = None,
     summary: SummaryOption = False,
     replay: ReplayOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Show a log of the bus in CiA 301 and CiA 402 terms, or its figures.
 
@@ -74,9 +74,7 @@ def canlog(
     log's start. --summary and --json print figures instead of frames: frame counts, bus
     load, SYNC jitter, and every emergency, SDO abort and error frame.
     """
-    from painter.canopen.config.bus_file import load_bus
-
-    bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
+    bus = read_bus(bus_file)
     if replay is not None:
         from painter.jobs.replay_bus_log import replay_bus_log
 

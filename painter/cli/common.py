@@ -1,130 +1,41 @@
-"""What the commands share: options, results, errors, progress and output folders."""
+"""What the commands share: results, errors, progress and output folders."""
 
+import dataclasses
 import json
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from painter.errors import InputError
-from painter.resources import named_scenarios
+from painter.resources import models_path
 from perception.settings import problems
 
 if TYPE_CHECKING:
+    from painter.canopen.config.bus_config import BusConfig
     from painter.planning.config import ZoneConfig
 
 
-def complete_scenario(incomplete: str) -> list[str]:
-    """Returns the named scenarios that begin with what was typed."""
-    return [name for name in named_scenarios() if name.startswith(incomplete)]
-
-
-ScenarioArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="Named scenario or path of a scenario's YAML file.  [default: cubes, or "
-        "the scenario of the run that is resumed or touched up]",
-        show_default=False,
-        autocompletion=complete_scenario,
-    ),
-]
-ScenarioOption = Annotated[
-    str,
-    typer.Option(
-        metavar="SCENARIO",
-        help="Scenario that describes the robot, tip and settings: a name or a YAML "
-        "file.",
-        autocompletion=complete_scenario,
-    ),
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Override a scenario value, in SI units, e.g. raster.speed=0.5; "
-        "repeatable.",
-    ),
-]
-OutOption = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Folder for the result.")
-]
-RunFolderOption = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Run folder to write.")
-]
-ResumeOption = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="RUN", help="Resume a stopped run: paint the strokes that are left."
-    ),
-]
-BusOption = Annotated[
-    Path | None,
-    typer.Option("--bus", metavar="FILE", help="Bus file.  [default: the robot's]"),
-]
-InterfaceOption = Annotated[
-    str | None,
-    typer.Option(
-        help="python-can interface (socketcan, slcan, udp_multicast ...), or `local` "
-        "for a socket on this machine; overrides the bus file."
-    ),
-]
-ChannelOption = Annotated[
-    str | None,
-    typer.Option(
-        help="CAN channel, e.g. can0, or path of the socket; overrides the bus file."
-    ),
-]
-RateOption = Annotated[
-    float,
-    typer.Option(
-        min=0.05,
-        max=1.0,
-        help="Speed of the run's clock against real time. Below 1, drives, world and "
-        "planning have more time to compute. `painter drives` and `painter deploy` "
-        "must use the same value.",
-    ),
-]
-IncludeOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--include",
-        metavar="X,Y,X,Y...",
-        help="Paint only inside this zone: two opposite corners of a rectangle, or all "
-        "corners of a polygon, m from the lower left corner; repeatable.",
-    ),
-]
-ExcludeOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--exclude",
-        metavar="X,Y,X,Y...",
-        help="Do not paint inside this zone; same form as --include; repeatable.",
-    ),
-]
-JsonOption = Annotated[
-    bool,
-    typer.Option("--json", help="Print only the result, as JSON, on stdout."),
-]
-
-
-def print_result(result: Mapping[str, Any], *, as_json: bool) -> None:
+def print_result(
+    result: Mapping[str, Any], *, as_json: bool, short: Mapping[str, Any] | None = None
+) -> None:
     """Prints what a command found.
 
     Args:
         result: Names and JSON values; numbers in SI units or with the unit in the name.
         as_json: One JSON object, else a line for each name.
+        short: What is printed as lines in place of `result`; None = all of it.
     """
     if as_json:
         typer.echo(json.dumps(result, indent=2, allow_nan=False))
         return
-    width = max(map(len, result), default=0)
-    for name, value in result.items():
+    shown = result if short is None else short
+    width = max(map(len, shown), default=0)
+    for name, value in shown.items():
         text = f"{value:.4g}" if isinstance(value, float) else str(value)
         typer.echo(f"{name:<{width}}  {text}")
 
@@ -137,9 +48,6 @@ def print_run(figures: Mapping[str, Any], out: Path, *, as_json: bool) -> None:
         out: The run folder.
         as_json: Whether all of them are printed, as one JSON object.
     """
-    if as_json:
-        print_result(figures, as_json=True)
-        return
     names = (
         "result",
         "motion_time_s",
@@ -154,7 +62,8 @@ def print_run(figures: Mapping[str, Any], out: Path, *, as_json: bool) -> None:
     summary |= {
         name: figures["timing"][name] for name in ("cycle_time_s", "wall_clock_s")
     }
-    print_result(summary | {"report": str(out / "report.html")}, as_json=False)
+    summary["report"] = str(out / "report.html")
+    print_result(figures, as_json=as_json, short=summary)
 
 
 def print_error(message: str, code: str) -> None:
@@ -173,6 +82,27 @@ def fail_unless_done(figures: Mapping[str, Any]) -> None:
         cause = figures["cause"] or "no cause is known."
         print_error(f"{figures['result']}: {cause}", figures["code"] or "PNT-USE-050")
         raise typer.Exit(1)
+
+
+def read_bus(
+    file: Path | None, interface: str | None = None, channel: str | None = None
+) -> "BusConfig":
+    """Reads a bus file.
+
+    Args:
+        file: The bus file; None = the robot's.
+        interface: Overrides the file's.
+        channel: Overrides the file's.
+
+    Raises:
+        InputError: The file cannot be read; names key, value and bound.
+    """
+    from painter.canopen.config.bus_file import load_bus
+
+    bus = load_bus(file or models_path("bus", "painter.bus.yaml"))
+    return dataclasses.replace(
+        bus, interface=interface or bus.interface, channel=channel or bus.channel
+    )
 
 
 def parse_zones(

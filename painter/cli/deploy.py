@@ -1,27 +1,13 @@
 """`painter deploy`: the paint cycle on the robot, into a run folder."""
 
-import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.cli.common import (
-    BusOption,
-    ChannelOption,
-    InterfaceOption,
-    JsonOption,
-    RateOption,
-    ResumeOption,
-    RunFolderOption,
-    ScenarioArgument,
-    SetOption,
-    fail_unless_done,
-    print_run,
-    progress,
-)
+from painter.cli import options
+from painter.cli.common import fail_unless_done, print_run, progress, read_bus
 from painter.errors import InputError
-from painter.resources import models_path
 
 if TYPE_CHECKING:
     from painter.cycle.preflight import Check
@@ -63,21 +49,21 @@ AheadOption = Annotated[
 
 
 def deploy(
-    scenario: ScenarioArgument = None,
-    out: RunFolderOption = Path("runs/deploy"),
-    bus_file: BusOption = None,
-    interface: InterfaceOption = None,
-    channel: ChannelOption = None,
+    scenario: options.ScenarioArgument = None,
+    out: options.RunFolder = Path("runs/deploy"),
+    bus_file: options.Bus = None,
+    interface: options.Interface = None,
+    channel: options.Channel = None,
     camera: CameraOption = None,
-    overrides: SetOption = None,
-    resume: ResumeOption = None,
+    overrides: options.Set = None,
+    resume: options.Resume = None,
     dry_run: DryRunOption = False,
     speed: SpeedOption = 1.0,
     step: StepOption = False,
     log_bus: LogBusOption = False,
     ahead: AheadOption = 0.4,
-    rate: RateOption = 1.0,
-    as_json: JsonOption = False,
+    rate: options.Rate = 1.0,
+    as_json: options.Json = False,
 ) -> None:
     """Paint with the robot: check, look, scan, segment, plan, paint, report.
 
@@ -88,7 +74,6 @@ def deploy(
         InputError: Options exclude each other or name files that cannot be read.
     """
     _check_options(speed, rate, dry_run=dry_run, camera=camera)
-    from painter.canopen.config.bus_file import load_bus
     from painter.config import load_scenario
     from painter.jobs.run_deployment import Deployment, DeployOptions
     from painter.jobs.run_simulation import check_other_folder
@@ -101,17 +86,14 @@ def deploy(
         remainder = rest_of_run(RunFolder.open(resume))
         scenario = str(resume / SCENARIO)
     job = load_scenario(scenario or "cubes", overrides or ())
-    bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
-    bus = dataclasses.replace(
-        bus, interface=interface or bus.interface, channel=channel or bus.channel
-    )
-    options = DeployOptions(
+    bus = read_bus(bus_file, interface, channel)
+    how = DeployOptions(
         camera=camera, dry_run=dry_run, speed=speed, step=step,
         log_bus=log_bus, ahead=ahead, rate=rate,
     )  # fmt: skip
     with progress(f"Deploying {job.name}") as show:
         deployment = Deployment(
-            job, bus, options, ask=_ask, report_check=_print_check, show=show
+            job, bus, how, ask=_ask, report_check=_print_check, show=show
         )
         run = deployment.run(out, remainder)
     print_run(run.figures, out, as_json=as_json)

@@ -1,6 +1,5 @@
 """`painter drives`: simulated CiA 402 drives as a process of their own."""
 
-import dataclasses
 import re
 import tempfile
 from collections.abc import Sequence
@@ -10,17 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from painter.canopen.sim.faults import Fault
-from painter.cli.common import (
-    ChannelOption,
-    InterfaceOption,
-    JsonOption,
-    RateOption,
-    SetOption,
-    complete_scenario,
-    print_result,
-)
+from painter.cli import options
+from painter.cli.common import print_result, read_bus
 from painter.errors import InputError
-from painter.resources import models_path
 
 if TYPE_CHECKING:
     from painter.jobs.run_drives import PlannedFault
@@ -49,7 +40,7 @@ WorldOption = Annotated[
         metavar="NAME",
         help="Simulate the arm on the motors and the scene of this scenario, with "
         "camera and paint.  [default: motors only]",
-        autocompletion=complete_scenario,
+        autocompletion=options.complete_scenario,
     ),
 ]
 CameraOption = Annotated[
@@ -76,16 +67,16 @@ DurationOption = Annotated[
 
 def drives(
     bus_file: BusArgument = None,
-    interface: InterfaceOption = None,
-    channel: ChannelOption = None,
+    interface: options.Interface = None,
+    channel: options.Channel = None,
     faults: FaultOption = None,
     scenario: WorldOption = None,
-    overrides: SetOption = None,
+    overrides: options.Set = None,
     camera: CameraOption = CAMERA_SOCKET,
     truth: TruthOption = None,
-    rate: RateOption = 1.0,
+    rate: options.Rate = 1.0,
     duration: DurationOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Run simulated drives and the I/O node of a bus file on a CAN interface.
 
@@ -97,13 +88,9 @@ def drives(
     """
     if scenario is None and (overrides or truth is not None):
         raise InputError("--set and --truth: need --scenario.", code="PNT-USE-020")
-    from painter.canopen.config.bus_file import load_bus
     from painter.jobs.run_drives import run_drives
 
-    bus = load_bus(bus_file or models_path("bus", "painter.bus.yaml"))
-    bus = dataclasses.replace(
-        bus, interface=interface or bus.interface, channel=channel or bus.channel
-    )
+    bus = read_bus(bus_file, interface, channel)
     plan = [_parse_fault(argument) for argument in faults or ()]
     figures = run_drives(
         bus,

@@ -7,13 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from painter.cli.common import (
-    JsonOption,
-    OutOption,
-    output_folder,
-    print_result,
-    progress,
-)
+from painter.cli import options
+from painter.cli.common import output_folder, print_result, progress
 from painter.errors import InputError
 from perception.settings import validate
 
@@ -72,7 +67,7 @@ MapSetOption = Annotated[
 
 def map(
     frames: FramesArgument,
-    out: OutOption,
+    out: options.Out,
     poses: PosesOption = None,
     use_poses: UsePosesOption = True,
     store: StoreOption = None,
@@ -80,7 +75,7 @@ def map(
     mesh: MeshOption = False,
     voxels: VoxelsOption = None,
     overrides: MapSetOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Map a recorded RGB-D sequence: correct its poses and fuse one surface.
 

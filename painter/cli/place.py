@@ -6,17 +6,8 @@ from typing import Annotated
 
 import typer
 
-from painter.cli.common import (
-    ExcludeOption,
-    IncludeOption,
-    JsonOption,
-    OutOption,
-    ScenarioOption,
-    SetOption,
-    output_folder,
-    parse_zones,
-    print_result,
-)
+from painter.cli import options
+from painter.cli.common import output_folder, parse_zones, print_result
 from painter.errors import InputError
 
 STATIONS_FILE = "stations.json"
@@ -39,14 +30,14 @@ SceneOption = Annotated[
 
 
 def place(
-    out: OutOption,
+    out: options.Out,
     wall: WallOption = None,
     scene: SceneOption = None,
-    include: IncludeOption = None,
-    exclude: ExcludeOption = None,
-    scenario: ScenarioOption = "blank",
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
+    include: options.Include = None,
+    exclude: options.Exclude = None,
+    scenario: options.Scenario = "blank",
+    overrides: options.Set = None,
+    as_json: options.Json = False,
 ) -> None:
     """Propose base positions for a wall, from the arm's reach.
 

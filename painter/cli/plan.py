@@ -5,13 +5,8 @@ from typing import Annotated
 
 import typer
 
+from painter.cli import options
 from painter.cli.common import (
-    ExcludeOption,
-    IncludeOption,
-    JsonOption,
-    OutOption,
-    ScenarioOption,
-    SetOption,
     output_folder,
     parse_corners,
     parse_zones,
@@ -55,16 +50,16 @@ MarkOption = Annotated[
 
 def plan(
     segmentation: SegmentationArgument,
-    out: OutOption,
-    scenario: ScenarioOption = "cubes",
-    overrides: SetOption = None,
+    out: options.Out,
+    scenario: options.Scenario = "cubes",
+    overrides: options.Set = None,
     expected_wall: ExpectedWallOption = False,
     from_stroke: FromStrokeOption = 1.0,
     touch_up: TouchUpOption = None,
     mark: MarkOption = None,
-    include: IncludeOption = None,
-    exclude: ExcludeOption = None,
-    as_json: JsonOption = False,
+    include: options.Include = None,
+    exclude: options.Exclude = None,
+    as_json: options.Json = False,
 ) -> None:
     """Plan the paint program of a segmented wall.
 

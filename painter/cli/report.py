@@ -5,14 +5,15 @@ from typing import Annotated
 
 import typer
 
-from painter.cli.common import JsonOption, print_result
+from painter.cli import options
+from painter.cli.common import print_result
 
 FolderArgument = Annotated[
     Path, typer.Argument(metavar="DIR", help="Run folder, complete or not.")
 ]
 
 
-def report(folder: FolderArgument, as_json: JsonOption = False) -> None:
+def report(folder: FolderArgument, as_json: options.Json = False) -> None:
     """Rebuild report.json and report.html of a run from its other files.
 
     Raises:
@@ -23,13 +24,10 @@ def report(folder: FolderArgument, as_json: JsonOption = False) -> None:
     from painter.run.page.report import write_report
 
     figures = write_report(RunFolder.open(folder))
-    if as_json:
-        print_result(figures, as_json=True)
-        return
     known = {
         info.name: info.text(figures)
         for info in FIGURES
         if info.value(figures) is not None
     }
-    page = {"page": str(folder / PAGE)}
-    print_result({"result": figures["result"]} | known | page, as_json=False)
+    short = {"result": figures["result"]} | known | {"page": str(folder / PAGE)}
+    print_result(figures, as_json=as_json, short=short)

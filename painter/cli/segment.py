@@ -8,13 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from painter.cli.common import (
-    JsonOption,
-    OutOption,
-    SetOption,
-    output_folder,
-    print_result,
-)
+from painter.cli import options
+from painter.cli.common import output_folder, print_result
 from painter.errors import InputError
 
 
@@ -119,7 +114,7 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Random seed of RANSAC.")]
 
 def segment(
     cloud: CloudArgument,
-    out: OutOption,
+    out: options.Out,
     intrinsics: IntrinsicsOption = None,
     up: UpOption = None,
     unit: UnitOption = Unit.M,
@@ -131,29 +126,29 @@ def segment(
     fine: FineOption = False,
     distance: DistanceOption = None,
     max_range: MaxRangeOption = None,
-    overrides: SetOption = None,
+    overrides: options.Set = None,
     seed: SeedOption = 1,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Segment a recorded cloud or depth image into wall and other regions.
 
     Writes segmentation.npz, segmentation.json, segmentation.png and wall_mask.png.
     """
-    options: dict[str, Any] = _lengths(
+    values: dict[str, Any] = _lengths(
         cell=cell,
         inlier_distance=inlier_distance,
         distance=distance,
         max_range=max_range,
     )
-    options |= _parsed(tile, up, viewpoint, set_back)
+    values |= _parsed(tile, up, viewpoint, set_back)
     from painter.config import load_scenario
     from painter.run.page.recorded_wall import write_recorded_wall
     from perception.recorded.segment_file import segment_file
 
     config = load_scenario("blank", overrides or ()).segmentation
     for name, field in (("cell", "cell"), ("inlier_distance", "distance_threshold")):
-        if options[name] is None and _is_set(overrides, f"segmentation.{field}"):
-            options[name] = getattr(config, field)
+        if values[name] is None and _is_set(overrides, f"segmentation.{field}"):
+            values[name] = getattr(config, field)
     wall = segment_file(
         cloud,
         config=config,
@@ -161,7 +156,7 @@ def segment(
         unit=METRES[unit],
         fine=fine,
         seed=seed,
-        **options,
+        **values,
     )
     with output_folder(out) as folder:
         figures = write_recorded_wall(folder, wall, title=cloud.name)
@@ -267,17 +262,15 @@ def _is_set(overrides: Sequence[str] | None, key: str) -> bool:
 
 
 def _print_figures(figures: dict[str, Any], out: Path, *, as_json: bool) -> None:
-    if as_json:
-        print_result(figures, as_json=True)
-        return
     short = {
         name: value
         for name, value in figures.items()
         if not isinstance(value, list | dict)
     }
-    print_result(short, as_json=False)
-    _print_regions(figures["regions"])
-    typer.echo(f"written to {out}")
+    print_result(figures, as_json=as_json, short=short)
+    if not as_json:
+        _print_regions(figures["regions"])
+        typer.echo(f"written to {out}")
 
 
 def _print_regions(regions: list[dict[str, Any]], most: int = 10) -> None:

@@ -5,17 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.cli.common import (
-    JsonOption,
-    ResumeOption,
-    RunFolderOption,
-    ScenarioArgument,
-    SetOption,
-    fail_unless_done,
-    parse_corners,
-    print_run,
-    progress,
-)
+from painter.cli import options
+from painter.cli.common import fail_unless_done, parse_corners, print_run, progress
 from painter.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,17 +45,17 @@ ClearOption = Annotated[
 
 
 def simulate(
-    scenario: ScenarioArgument = None,
-    out: RunFolderOption = Path("runs/latest"),
-    overrides: SetOption = None,
+    scenario: options.ScenarioArgument = None,
+    out: options.RunFolder = Path("runs/latest"),
+    overrides: options.Set = None,
     seed: SeedOption = None,
     meshcat: MeshcatOption = False,
     replay: ReplayOption = True,
     stop_at_stroke: StopOption = None,
-    resume: ResumeOption = None,
+    resume: options.Resume = None,
     touch_up: TouchUpOption = None,
     clear: ClearOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Simulate a whole paint cycle: look, scan, segment, plan, paint, report.
 
