@@ -7,7 +7,7 @@ include/uapi/linux/can/error.h (error frames).
 from dataclasses import dataclass
 
 from painter.canopen.analysis.kinds import Kind
-from painter.canopen.analysis.object_names import object_text
+from painter.canopen.analysis.object_names import TEXTS, object_text
 from painter.canopen.analysis.value_text import ValueFormatter
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.master.arm_nodes import ArmNodes
@@ -22,34 +22,9 @@ from painter.canopen.protocol.frames import (
     SYNC_ID,
     Frame,
 )
-from painter.canopen.protocol.nmt import NmtCommand, NmtState
 from painter.canopen.protocol.pdo_maps import PdoMaps
 from painter.canopen.protocol.sdo import address_of, expedited_data, segment_data
 
-_NMT_COMMANDS: dict[int, str] = {
-    NmtCommand.START: "start",
-    NmtCommand.STOP: "stop",
-    NmtCommand.ENTER_PRE_OPERATIONAL: "enter pre-operational",
-    NmtCommand.RESET_NODE: "reset node",
-    NmtCommand.RESET_COMMUNICATION: "reset communication",
-}
-_NMT_STATES: dict[int, str] = {
-    NmtState.INITIALISING: "boot-up",
-    NmtState.STOPPED: "STOPPED",
-    NmtState.OPERATIONAL: "OPERATIONAL",
-    NmtState.PRE_OPERATIONAL: "PRE-OPERATIONAL",
-}
-_ERRORS = {
-    0x01: "transmission timed out",
-    0x02: "arbitration lost",
-    0x04: "controller problem",
-    0x08: "protocol violation",
-    0x10: "transceiver problem",
-    0x20: "no acknowledge",
-    0x40: "bus-off",
-    0x80: "bus error",
-    0x100: "controller restarted",
-}
 # Objects whose changes are news; positions always change.
 _NEWS = frozenset({0x6000, 0x6040, 0x6041, 0x6060, 0x6061, 0x6200})
 
@@ -109,7 +84,7 @@ class Decoder:
         if frame.is_error:
             return Decoded(Kind.ERROR, "", _error_text(cob_id))
         if cob_id == NMT_ID and len(data) == 2:
-            command = _NMT_COMMANDS.get(data[0], f"command {data[0]}")
+            command = TEXTS["nmt_commands"].get(data[0], f"command {data[0]}")
             node = self._name(data[1]) if data[1] else ""
             return Decoded(Kind.NMT, node, command)
         if cob_id == SYNC_ID:
@@ -123,7 +98,7 @@ class Decoder:
         if service == HEARTBEAT_BASE and len(data) == 1:
             state = data[0] & 0x7F
             is_news = state == 0 or self._has_changed(node_id, 0, state)
-            text = _NMT_STATES.get(state, f"state {state}")
+            text = TEXTS["nmt_states"].get(state, f"state {state}")
             return Decoded(Kind.HEARTBEAT, name, text, is_news)
         if service == SDO_TO_SERVER and len(data) == 8:
             return self._request(node_id, data)
@@ -220,5 +195,5 @@ def _abort(code: int) -> str:
 
 
 def _error_text(bits: int) -> str:
-    texts = [text for bit, text in _ERRORS.items() if bits & bit]
+    texts = [text for bit, text in TEXTS["error_frames"].items() if bits & bit]
     return ", ".join(texts) or f"class {bits:X}h"
