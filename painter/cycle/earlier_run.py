@@ -10,7 +10,7 @@ import numpy as np
 from painter.config import Scenario, load_scenario
 from painter.errors import InputError
 from painter.planning.program.remainder import Remainder
-from painter.planning.tile import cell_centres, grid_points
+from painter.planning.tile import grid_points
 from painter.planning.zones import inside
 from painter.robot.planners import MakeProgramPlanner
 from painter.run.figures.film_on_tile import film_and_truth, film_around
@@ -25,6 +25,8 @@ _SAME = ("scene", "random_seed", "tile")
 @dataclass(frozen=True)
 class EarlierRun:
     """An earlier run that a new one continues.
+
+    Example: `simulate(EarlierRun.to_resume(Path("runs/stopped"), ()), "runs/rest")`.
 
     Attributes:
         job: Its scenario, with the new run's overrides.
@@ -41,11 +43,16 @@ class EarlierRun:
         """Reads a stopped run, to paint its remaining strokes.
 
         Args:
-            path: Its folder.
-            overrides: Words "key=value" over its scenario.
+            path: Its run folder.
+            overrides: "key=value" over its scenario, in SI units, as in `simulate`;
+                scene, random seed and tile stay.
+
+        Returns:
+            The run, to be given to `simulate` in place of a scenario.
 
         Raises:
-            InputError: The run cannot be resumed; says why.
+            InputError: It is no run folder, was not stopped while it painted, has no
+                film or truth, or an override changes the wall.
         """
         run, job = RunFolder.open(path), _job(path, overrides)
         return cls(job, rest_of_run(run), _film(run, job, None))
@@ -60,13 +67,17 @@ class EarlierRun:
         """Reads a run, to touch up its film where it is thin.
 
         Args:
-            path: Its folder.
-            overrides: Words "key=value" over its scenario.
+            path: Its run folder.
+            overrides: "key=value" over its scenario, as in `to_resume`.
             cleared: Corners x, y in T, m, of the area whose film is removed first; None
                 = none.
 
+        Returns:
+            The run, to be given to `simulate` in place of a scenario.
+
         Raises:
-            InputError: The run has no film, or the film is thin nowhere.
+            InputError: It is no run folder, has no segmentation, film or truth, its
+                film is thin nowhere, or an override changes the wall.
         """
         run, job = RunFolder.open(path), _job(path, overrides)
         wall, film = wall_of_run(run), _film(run, job, cleared)
@@ -103,15 +114,13 @@ def _film(
     sprayed = film.sprayed
     if cleared is not None:
         X_TS = wall_of_run(run).X_WT.inverse() @ truth.X_WS
-        x, y = cell_centres(thickness.shape, film.cell)
-        p_TQs = X_TS @ grid_points(x + film.x0, y + film.y0)
-        gone = inside(cleared, p_TQs[:2].T)
-        gone = gone.reshape(thickness.shape)
+        p_TQs = X_TS @ grid_points(*film.centres())
+        gone = inside(cleared, p_TQs[:2].T).reshape(thickness.shape)
         # As if never sprayed, so that the mass balance holds.
         taken = float(thickness[gone].sum()) * film.cell**2
         sprayed -= taken / job.gun.tip.transfer_efficiency
         thickness[gone] = 0.0
-    return FilmState.of_volume(
+    return FilmState(
         thickness * film.cell**2,
         cell=film.cell,
         origin=np.array([film.x0, film.y0]),

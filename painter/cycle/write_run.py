@@ -1,5 +1,6 @@
 """Writes the log of a cycle into its run folder, with the truth where it is known."""
 
+import time
 from collections.abc import Callable
 
 from PIL import Image
@@ -12,6 +13,8 @@ from painter.robot.true_scene import true_scene
 from painter.run.figures.predicted_film import run_preview
 from painter.run.folder.folder import LOOK, RunFolder
 from painter.run.folder.values import Film, Truth
+from painter.run.page.report import finish_run
+from painter.run.run import Run
 from painter.scene.surface import height_field, is_paintable, surface_at
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
@@ -52,6 +55,28 @@ def write_log(
     if log.program is not None:
         preview = run_preview(folder, log.program, folder.scenario())
         folder.save_program(log.program, preview)
+
+
+def end_run(folder: RunFolder, log: CycleLog, *, start: float) -> Run:
+    """Writes the report of a cycle whose log is written.
+
+    Args:
+        folder: The run's folder.
+        log: Of the cycle.
+        start: `time.perf_counter()` when the program began the run, s.
+
+    Returns:
+        The run; it is complete if the cycle came to DONE.
+    """
+    finish_run(
+        folder,
+        time=log.end_time,
+        result=log.status.phase.value,
+        cause=log.status.cause or None,
+        code=log.status.code or None,
+        wall_clock=time.perf_counter() - start,
+    )
+    return Run(folder.path)
 
 
 def write_collisions(

@@ -10,7 +10,6 @@ from painter.config import Scenario
 from painter.diagrams.joint_loop import AddJointLoop
 from painter.diagrams.surroundings import AddScene, AddSurroundings
 from painter.robot.arm_model import AddRobot
-from painter.robot.true_scene import true_scene
 from painter.systems.simulated.joint_encoder import JointEncoder
 from painter.systems.simulated.paint_film import FilmState
 from painter.systems.simulated.simulated_drives import SimulatedDrives
@@ -41,8 +40,7 @@ def MakeSimStation(
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(scenario.plant_config, builder)
     AddRobot(Parser(plant), scenario.directives)
-    scene, X_WS = true_scene(scenario)
-    AddScene(plant, scene, X_WS)
+    AddScene(plant, scenario)
     plant.Finalize()
     arm = plant.GetModelInstanceByName("arm")
     plant.SetDefaultPositions(arm, np.deg2rad(scenario.motion.home_deg))
@@ -52,8 +50,6 @@ def MakeSimStation(
         plant,
         scene_graph,
         scenario,
-        scene=scene,
-        X_WS=X_WS,
         state=plant.get_state_output_port(arm),
         film=film,
     )

@@ -33,7 +33,7 @@ from painter.robot.arm_model import (
     X_W_FLOOR,
     GetArmKinematics,
 )
-from painter.scene.config import Scene
+from painter.robot.true_scene import true_scene
 from painter.scene.sdf import scene_sdf
 from painter.scene.surface import height_field
 from painter.systems.simulated.clearance_monitor import ClearanceMonitor
@@ -55,14 +55,14 @@ def _SceneFiles() -> tempfile.TemporaryDirectory:
     return tempfile.TemporaryDirectory(prefix="painter-scene-")
 
 
-def AddScene(plant: MultibodyPlant, scene: Scene, X_WS: RigidTransform) -> None:
+def AddScene(plant: MultibodyPlant, scenario: Scenario) -> None:
     """Adds the scene, welded to W, and the floor.
 
     Args:
         plant: Not finalised, with the robot in it.
-        scene: In front of the robot.
-        X_WS: Pose of the scene's frame S.
+        scenario: Names the scene.
     """
+    scene, X_WS = true_scene(scenario)
     # Renderers and Meshcat read the mesh and texture of a wall later on.
     folder = tempfile.mkdtemp(dir=_SceneFiles().name)
     Parser(plant).AddModelsFromString(scene_sdf(scene, Path(folder)), "sdf")
@@ -78,8 +78,6 @@ def AddSurroundings(
     scene_graph: SceneGraph,
     scenario: Scenario,
     *,
-    scene: Scene,
-    X_WS: RigidTransform,
     state: OutputPort,
     film: FilmState | None,
 ) -> None:
@@ -92,14 +90,13 @@ def AddSurroundings(
         builder: Holds `scene_graph`.
         plant: With robot and scene; need not be in the builder.
         scene_graph: With the geometry of the plant.
-        scenario: Camera and gun.
-        scene: In front of the robot.
-        X_WS: Pose of the scene's frame S.
+        scenario: Scene, camera and gun.
         state: (10,) true q, v of the arm; rad, rad/s.
         film: Film that is on the wall already; None = none.
     """
     camera = _AddWallCamera(builder, plant, scene_graph, scenario)
     _AddClearance(builder, plant, scene_graph)
+    scene, X_WS = true_scene(scenario)
     surface = height_field(
         scene,
         cell=FILM_CELL,

@@ -18,13 +18,12 @@ from painter.cycle.cycle_log import CycleLog
 from painter.cycle.deploy import DeployCycle
 from painter.cycle.preflight import Check, preflight
 from painter.cycle.step_by_step import StepByStep
-from painter.cycle.write_run import event_watch, write_log
+from painter.cycle.write_run import end_run, event_watch, write_log
 from painter.diagrams.hardware_station import RobotConnection
 from painter.errors import BusError, PainterError
 from painter.jobs.run_simulation import versions
 from painter.planning.program.remainder import Remainder
 from painter.run.folder.folder import RunFolder
-from painter.run.page.report import finish_run
 from painter.run.run import Run
 from painter.systems.values import CycleStatus, FollowerStatus, Phase
 from painter.timebase import TimeBase
@@ -117,15 +116,7 @@ class Deployment:
                 folder.mark_incomplete(f"{Phase.FAULT.value}: {error}", error.code)
                 raise
         write_log(folder, self._job, log)
-        finish_run(
-            folder,
-            time=log.end_time,
-            result=log.status.phase.value,
-            cause=log.status.cause or None,
-            code=log.status.code or None,
-            wall_clock=time.perf_counter() - start,
-        )
-        return Run(out)
+        return end_run(folder, log, start=start)
 
     def _cycle(
         self,

@@ -14,12 +14,11 @@ from painter.cycle.cycle_log import CycleLog
 from painter.cycle.earlier_run import EarlierRun
 from painter.cycle.running_cycle import Watch
 from painter.cycle.simulate import SimulateCycle
-from painter.cycle.write_run import event_watch, write_log
+from painter.cycle.write_run import end_run, event_watch, write_log
 from painter.diagrams.brain import OwnSystems
 from painter.errors import InputError
 from painter.planning.strokes.spray_settings import SpraySettings
 from painter.run.folder.folder import SCENE, RunFolder
-from painter.run.page.report import finish_run
 from painter.run.pictures.replay import add_paint, set_view
 from painter.run.run import Run
 from painter.scene.load import load_scene
@@ -120,15 +119,7 @@ def simulate(
     write_log(folder, job, log, before=None if earlier is None else earlier.film)
     if replay and viewer is not None:
         _write_replay(folder, viewer, job, log)
-    finish_run(
-        folder,
-        time=log.end_time,
-        result=log.status.phase.value,
-        cause=log.status.cause or None,
-        code=log.status.code or None,
-        wall_clock=time.perf_counter() - start,
-    )
-    return Run(folder.path)
+    return end_run(folder, log, start=start)
 
 
 def versions(*more: str) -> dict[str, str]:

@@ -16,7 +16,6 @@ from painter.config import Scenario
 from painter.diagrams.surroundings import AddScene, AddSurroundings
 from painter.planning.arm.kinematics import NQ
 from painter.robot.arm_model import AddRobot
-from painter.robot.true_scene import true_scene
 from painter.systems.simulated.paint_film import FilmState
 from perception.ground import FloatArray
 
@@ -55,8 +54,7 @@ class SimWorld:
         plant = MultibodyPlant(0.0)
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         AddRobot(Parser(plant), scenario.directives)
-        scene, X_WS = true_scene(scenario)
-        AddScene(plant, scene, X_WS)
+        AddScene(plant, scenario)
         plant.Finalize()
         state = builder.AddNamedSystem("state", PassThrough(2 * NQ))
         split = builder.AddNamedSystem("state_split", Demultiplexer(2 * NQ, NQ))
@@ -75,8 +73,6 @@ class SimWorld:
             plant,
             scene_graph,
             scenario,
-            scene=scene,
-            X_WS=X_WS,
             state=state.get_output_port(),
             film=film,
         )

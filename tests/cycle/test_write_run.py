@@ -54,7 +54,7 @@ def segmentation(X_WT):
 def film():
     """100 µm on a grid 0.3 m larger than the tile on each side."""
     shape = (260, 260)
-    return FilmState.of_volume(
+    return FilmState(
         np.full(shape, 100e-6 * CELL**2),
         cell=CELL,
         origin=np.array([-MARGIN, -MARGIN]),

@@ -64,12 +64,9 @@ def predicted_figures(
     preview, truth = run_preview(folder, program, scenario), folder.truth()
     if preview is None or truth is None:
         return {}
-    ny, nx = film.thickness.shape
-    x = film.x0 + (np.arange(nx, dtype=np.float64) + 0.5) * film.cell
-    y = film.y0 + (np.arange(ny, dtype=np.float64) + 0.5) * film.cell
     X_TS = program.X_WT.inverse() @ truth.X_WS
-    p_TQs = X_TS @ grid_points(x, y)
-    planned = preview.film_at(p_TQs[0], p_TQs[1]).reshape(ny, nx)
+    p_TQs = X_TS @ grid_points(*film.centres())
+    planned = preview.film_at(p_TQs[0], p_TQs[1]).reshape(film.thickness.shape)
     tile = film.truth_paintable | film.truth_keepout
     error = np.abs(planned - film.thickness)[tile].mean()
     return {

@@ -17,6 +17,7 @@ from perception.io.clouds import read_fields
 from perception.io.ply import write_ply
 from perception.values import SurfaceMap
 
+_EXECUTED = tuple(field.name for field in dataclasses.fields(Executed))
 _MAP_FIELDS = ("x", "y", "z", "nx", "ny", "nz")
 _MAP_COMMENT = "Painter map: points and normals in the world frame W, m"
 
@@ -35,15 +36,12 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def save_executed(path: Path, executed: Executed) -> None:
     """Writes executed.npz."""
-    names = (field.name for field in dataclasses.fields(Executed))
-    _save(path, {name: getattr(executed, name) for name in names})
+    _save(path, {name: getattr(executed, name) for name in _EXECUTED})
 
 
 def load_executed(path: Path) -> Executed:
     """Reads executed.npz; raises InputError if it is not one."""
-    return Executed(
-        **_load(path, ("time", "q", "v", "trigger", "X_WG", "X_WG_desired"))
-    )
+    return Executed(**_load(path, _EXECUTED))
 
 
 def save_film(path: Path, film: Film) -> None:

@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 from pydrake.math import RigidTransform
 
+from painter.planning.tile import cell_centres, grid_points
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
 
@@ -64,6 +65,11 @@ class Film(FrozenValue):
     missed: float
     before: FloatArray | None = None
 
+    def centres(self) -> tuple[FloatArray, FloatArray]:
+        """Returns x (nx,) of the columns and y (ny,) of the rows, m in S."""
+        x, y = cell_centres(self.thickness.shape, self.cell)
+        return x + self.x0, y + self.y0
+
     @classmethod
     def on_tile(
         cls,
@@ -100,18 +106,14 @@ class Film(FrozenValue):
         Returns:
             The film.
         """
-        ny, nx = thickness.shape
-        x, y = np.meshgrid(
-            x0 + (np.arange(nx) + 0.5) * cell, y0 + (np.arange(ny) + 0.5) * cell
-        )
-        p_SQs = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-        p_TQs = X_ST.inverse() @ p_SQs
+        x, y = cell_centres(thickness.shape, cell)
+        p_TQs = X_ST.inverse() @ grid_points(x + x0, y + y0)
         inside = (
             (p_TQs[0] >= 0)
             & (p_TQs[0] < tile_size[0])
             & (p_TQs[1] >= 0)
             & (p_TQs[1] < tile_size[1])
-        ).reshape(ny, nx)
+        ).reshape(thickness.shape)
         return cls(
             thickness=np.array(thickness, dtype=float),
             kind=np.array(kind, dtype=np.uint8),

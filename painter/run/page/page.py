@@ -80,7 +80,13 @@ def report_page(folder: RunFolder, figures: Mapping[str, Any]) -> str:
     phases = [name for name, _, _ in phase_spans(events) if name not in STOPPED]
     return environment.get_template("report.html.j2").render(
         sheet=Markup((_HERE / "report.css").read_text(encoding="utf-8")),
-        figures={"scene": None, "seed": None, "scenario": None, "cause": None}
+        figures={
+            "scene": None,
+            "seed": None,
+            "scenario": None,
+            "cause": None,
+            "code": None,
+        }
         | dict(figures),
         is_done=figures["result"] == DONE,
         last_phase=phases[-1] if phases else "",

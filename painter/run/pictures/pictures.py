@@ -81,7 +81,14 @@ def depth_image(
 
 @style.styled
 def label_picture(segmentation: WallSegmentation) -> Figure:
-    """Draws the regions with their areas; the largest has number 1."""
+    """Draws the regions with their areas; the largest has number 1.
+
+    Args:
+        segmentation: Of a tile: `labels` (ny, nx), 0 where nothing was seen.
+
+    Returns:
+        A Matplotlib figure; axes in m, in T, and areas in m². `png` renders it.
+    """
     labels, size = segmentation.labels, grid_size(segmentation)
     numbers, counts = np.unique(labels[labels > 0], return_counts=True)
     shown = len(style.SERIES)
@@ -215,14 +222,22 @@ def _stroke_entries(program: PaintProgram) -> Sequence[Line2D]:
 
 @style.styled
 def film_picture(film: Film, nominal: float) -> Figure:
-    """Draws the wet film with keep-out outlines, over µm and % of nominal."""
+    """Draws the wet film with the edges of keep-out areas and of the tile.
+
+    Args:
+        film: The film of a run: `thickness` (ny, nx) in m, row 0 at the bottom.
+        nominal: Wet film thickness that the program aims at, m, greater than 0; the
+            colours show µm and % of it.
+
+    Returns:
+        A Matplotlib figure; axes in m, in the scene's frame S. `png` renders it.
+    """
     ny, nx = film.thickness.shape
     low = film.x0, film.y0
     size = nx * film.cell, ny * film.cell
     figure, axes, bar = style.film_figure(film.thickness / nominal, size, low)
     bar.set_label(f"wet film [% of nominal {1e6 * nominal:.0f} µm]")
-    x = film.x0 + (np.arange(nx) + 0.5) * film.cell
-    y = film.y0 + (np.arange(ny) + 0.5) * film.cell
+    x, y = film.centres()
     entries = []
     tile = film.truth_paintable | film.truth_keepout
     outlines = (

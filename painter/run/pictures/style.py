@@ -124,7 +124,15 @@ def film_figure(
 
 
 def png(figure: Figure, dpi: int = 160) -> bytes:
-    """Renders a figure as PNG."""
+    """Renders a figure as PNG.
+
+    Args:
+        figure: Matplotlib figure, as `map_picture` and its like return.
+        dpi: Pixels per inch of the figure's size.
+
+    Returns:
+        Content of the PNG file.
+    """
     stream = io.BytesIO()
     with mpl.rc_context(dict(_STYLE)):
         figure.savefig(stream, format="png", dpi=dpi)

@@ -1,7 +1,6 @@
 """The paint film on the scene; simulation only."""
 
-from dataclasses import dataclass
-from typing import Self
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.common.value import Value
@@ -19,7 +18,7 @@ from perception.settings import validate
 
 @dataclass(frozen=True, eq=False)
 class FilmState(FrozenValue):
-    """The film on the surface, and the state of the gun.
+    """The film on the surface, and the state of the gun; by default not yet sprayed.
 
     Attributes:
         volume: (ny, nx) m³ of paint on each cell, row 0 at the lowest y of S.
@@ -36,35 +35,12 @@ class FilmState(FrozenValue):
     volume: FloatArray
     cell: float
     origin: FloatArray
-    sprayed: float
-    missed: float
-    X_SG: RigidTransform | None
-    time: FloatArray
-    dose: FloatArray
-    trigger: float
-
-    @classmethod
-    def of_volume(
-        cls,
-        volume: FloatArray,
-        *,
-        cell: float,
-        origin: FloatArray,
-        sprayed: float = 0.0,
-        missed: float = 0.0,
-    ) -> Self:
-        """Makes a film that the gun has not sprayed on yet; see the attributes."""
-        return cls(
-            volume=volume,
-            cell=cell,
-            origin=np.array(origin, dtype=float),
-            sprayed=sprayed,
-            missed=missed,
-            X_SG=None,
-            time=np.zeros(0),
-            dose=np.zeros(0),
-            trigger=0.0,
-        )
+    sprayed: float = 0.0
+    missed: float = 0.0
+    X_SG: RigidTransform | None = None
+    time: FloatArray = field(default_factory=lambda: np.zeros(0))
+    dose: FloatArray = field(default_factory=lambda: np.zeros(0))
+    trigger: float = 0.0
 
     def same_grid(self, other: "FilmState") -> bool:
         """Returns whether another film lies on the same cells."""
@@ -147,7 +123,7 @@ class PaintFilm(ValueSystem):
         self._pose_port = self.DeclareAbstractInputPort("X_WG", Value(RigidTransform()))
         self._trigger_port = self.DeclareVectorInputPort("trigger", 1)
         # State.
-        film = FilmState.of_volume(np.zeros(height.shape), cell=cell, origin=origin)
+        film = FilmState(np.zeros(height.shape), cell, np.array(origin, dtype=float))
         if before is not None:
             if not film.same_grid(before):
                 raise ValueError(

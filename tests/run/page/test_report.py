@@ -127,7 +127,7 @@ def test_faulty_run_stays_incomplete_and_names_its_cause(
     )
     page = page_of(folder)
     assert "not complete: FAULT in PLAN" in page
-    assert "ReachError: stroke 3 &lt;left&gt;" in page
+    assert "ReachError: stroke 3 &lt;left&gt; [PNT-TEST-001]<br>" in page
     # The mask is right, but no target is met by a run that failed.
     assert "✓" not in page
 

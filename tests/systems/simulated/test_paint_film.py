@@ -192,7 +192,7 @@ def test_a_closed_gun_leaves_the_film_alone():
 
 
 def film_of(volume):
-    return FilmState.of_volume(
+    return FilmState(
         volume, cell=CELL, origin=np.full(2, -MARGIN), sprayed=3e-6, missed=1e-7
     )
 
