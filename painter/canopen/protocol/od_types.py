@@ -6,6 +6,8 @@ Source: CiA 301 v4.2.0, 7.1.6 (encoding) and table 44 (codes).
 import enum
 import struct
 
+from canopen.objectdictionary import ODVariable
+
 
 class DataType(enum.IntEnum):
     """Data types of the objects that drives and I/O nodes have."""
@@ -27,27 +29,16 @@ class DataType(enum.IntEnum):
     UNSIGNED64 = 0x1B
 
 
-_FORMATS = {
-    DataType.BOOLEAN: "<?",
-    DataType.INTEGER8: "<b",
-    DataType.INTEGER16: "<h",
-    DataType.INTEGER32: "<i",
-    DataType.UNSIGNED8: "<B",
-    DataType.UNSIGNED16: "<H",
-    DataType.UNSIGNED32: "<I",
-    DataType.REAL32: "<f",
-    DataType.REAL64: "<d",
-    DataType.INTEGER64: "<q",
-    DataType.UNSIGNED64: "<Q",
-}
+# Encoders of all types but strings and domains, which are bytes.
+_STRUCTS: dict[int, struct.Struct] = ODVariable.STRUCT_TYPES
 
 Value = int | float | bytes
 
 
 def size_of(data_type: DataType) -> int | None:
     """Returns the size in bytes; None for strings and domains, which vary."""
-    layout = _FORMATS.get(data_type)
-    return None if layout is None else struct.calcsize(layout)
+    layout = _STRUCTS.get(data_type)
+    return None if layout is None else layout.size
 
 
 def bounds(data_type: DataType) -> tuple[int, int]:
@@ -73,13 +64,13 @@ def pack(data_type: DataType, value: Value) -> bytes:
     Raises:
         ValueError: The value does not fit the type; names both.
     """
-    layout = _FORMATS.get(data_type)
+    layout = _STRUCTS.get(data_type)
     if layout is None:
         if not isinstance(value, bytes):
             raise ValueError(f"{data_type.name} takes bytes, got {value!r}.")
         return value
     try:
-        return struct.pack(layout, value)
+        return layout.pack(value)
     except struct.error:
         raise ValueError(f"{value!r} does not fit {data_type.name}.") from None
 
@@ -90,12 +81,12 @@ def unpack(data_type: DataType, data: bytes) -> Value:
     Raises:
         ValueError: The number of bytes does not fit the type; names both lengths.
     """
-    layout = _FORMATS.get(data_type)
+    layout = _STRUCTS.get(data_type)
     if layout is None:
         return data
-    if len(data) != struct.calcsize(layout):
+    if len(data) != layout.size:
         raise ValueError(
-            f"{data_type.name} takes {struct.calcsize(layout)} bytes, got {len(data)}."
+            f"{data_type.name} takes {layout.size} bytes, got {len(data)}."
         )
-    value: int | float = struct.unpack(layout, data)[0]
+    value: int | float = layout.unpack(data)[0]
     return int(value) if data_type == DataType.BOOLEAN else value
