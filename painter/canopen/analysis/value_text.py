@@ -1,6 +1,6 @@
 """Values of objects as text in the terms of CiA 301, 401 and 402."""
 
-from painter.canopen.analysis.object_names import object_text, object_value
+from painter.canopen.analysis.object_names import TEXTS, object_text, object_value
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.config.device import Mode
 from painter.canopen.config.units import AxisUnits
@@ -12,20 +12,6 @@ from painter.canopen.protocol.cia402 import (
     state_of,
 )
 
-# Bit 4 of the controlword, bits 12 and 13 of the statusword: their sense depends on the
-# mode.
-# Source: CiA 402-2 v4.0.0, "use of controlword and statusword" of each mode.
-_CONTROL_4: dict[int | None, str] = {
-    Mode.PROFILE_POSITION: "new set-point",
-    Mode.HOMING: "start homing",
-    Mode.INTERPOLATED_POSITION: "interpolate",
-}
-_STATUS_12: dict[int | None, str] = {
-    Mode.PROFILE_POSITION: "set-point taken",
-    Mode.HOMING: "homing attained",
-    Mode.INTERPOLATED_POSITION: "interpolates",
-    Mode.CYCLIC_SYNC_POSITION: "follows",
-}
 _STATUS_FLAGS = (
     (Status.WARNING, "warning"),
     (Status.TARGET_REACHED, "target reached"),
@@ -45,7 +31,7 @@ def controlword_text(word: int, mode: int | None = None) -> str:
     command = command_of(word)
     parts = ["no command" if command is None else command.name.replace("_", " ")]
     if word & CONTROL_MODE_4:
-        parts.append(_CONTROL_4.get(mode, "bit 4"))
+        parts.append(TEXTS["control_bit_4"].get(mode, "bit 4"))
     if word & CONTROL_HALT:
         parts.append("halt")
     return ", ".join(parts)
@@ -62,7 +48,7 @@ def statusword_text(word: int, mode: int | None = None) -> str:
     parts = ["no known state" if state is None else state.value]
     parts += [text for bit, text in _STATUS_FLAGS if word & bit]
     if word & Status.MODE_12:
-        parts.append(_STATUS_12.get(mode, "bit 12"))
+        parts.append(TEXTS["status_bit_12"].get(mode, "bit 12"))
     if word & Status.MODE_13:
         is_homing = mode == Mode.HOMING
         parts.append("homing error" if is_homing else "following error")
