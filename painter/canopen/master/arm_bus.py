@@ -264,9 +264,8 @@ class ArmBus:
         for drive in self.drives:
             drive.forget_owed()
         self._is_cyclic = True
-        timeout = self._bus.timeouts.boot
         yield from run_concurrently(
-            [node.wait_operational(timeout) for node in self._nodes.all]
+            [node.wait_operational() for node in self._nodes.all]
         )
         if not self.io.is_chain_closed:
             raise BusError("e-stop: the chain is open.", code="PNT-BUS-004")
@@ -337,7 +336,7 @@ class ArmBus:
         if self.state == BusState.ENABLED or (
             self.state == BusState.STOPPED and self._follower.is_braking
         ):
-            reason = first_stop_reason(self._bus, self.drives, self.io, now=now)
+            reason = first_stop_reason(self._bus, self._nodes, now=now)
             if reason is not None:
                 self.stop(reason, quick=True)
 

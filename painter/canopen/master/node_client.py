@@ -141,15 +141,15 @@ class NodeClient:
                 )
             yield
 
-    def wait_operational(self, timeout: float) -> Script:
+    def wait_operational(self) -> Script:
         """Yields until the node is operational and has sent a TPDO.
 
         Raises:
-            BusError: It is not within `timeout` s.
+            BusError: It is not within the time-out of the boot-up.
         """
         yield from self.wait(
             lambda: self.got_tpdo and self.nmt == NmtState.OPERATIONAL,
-            timeout,
+            self._timeouts.boot,
             "not operational",
         )
 

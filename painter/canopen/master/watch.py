@@ -1,48 +1,37 @@
 """Monitors of the nodes, which stop the arm, and of the bus load."""
 
 from collections import deque
-from collections.abc import Sequence
 
 from painter.canopen.config.bus_config import BusConfig
-from painter.canopen.master.drive_client import DriveClient
-from painter.canopen.master.io_client import IoClient
-from painter.canopen.master.node_client import NodeClient
+from painter.canopen.master.arm_nodes import ArmNodes
 from painter.canopen.protocol.frames import Frame, frame_time
 from painter.canopen.protocol.nmt import NmtState
 
 _WINDOW = 1.0
 
 
-def first_stop_reason(
-    bus: BusConfig,
-    drives: Sequence[DriveClient],
-    io: IoClient,
-    *,
-    now: float,
-) -> str | None:
+def first_stop_reason(bus: BusConfig, nodes: ArmNodes, *, now: float) -> str | None:
     """Returns the first reason to stop an enabled arm, or None.
 
     Args:
         bus: Holds the time-outs.
-        drives: All drives.
-        io: The I/O node.
+        nodes: All drives and the I/O node.
         now: Time, s.
     """
     timeouts = bus.timeouts
-    nodes: list[NodeClient] = [*drives, io]
-    for node in nodes:
+    for node in nodes.all:
         if now - node.heard > timeouts.heartbeat:
             return f"{node.name}: no heartbeat for {timeouts.heartbeat:g} s."
         if node.nmt != NmtState.OPERATIONAL:
             return f"{node.name}: left NMT state OPERATIONAL (is {node.nmt})."
-    for drive in drives:
+    for drive in nodes.drives:
         # In cycles, not seconds: a late master must not blame a drive.
         if drive.missed * bus.cycle >= timeouts.tpdo:
             return f"{drive.name}: no TPDO for {drive.missed} cycles."
         reason = drive.stop_reason()
         if reason is not None:
             return reason
-    return io.stop_reason()
+    return nodes.io.stop_reason()
 
 
 class LoadMeter:

@@ -26,6 +26,11 @@ def address_of(data: bytes) -> tuple[int, int]:
     return int.from_bytes(data[1:3], "little"), data[3]
 
 
+def head(command: int, index: int, sub: int) -> bytes:
+    """Returns the first four bytes of a request or answer."""
+    return bytes([command]) + index.to_bytes(2, "little") + bytes([sub])
+
+
 def expedited_data(data: bytes) -> bytes:
     """Returns the value in an expedited download request or upload answer."""
     size = 4 - (data[0] >> 2 & 3) if data[0] & 0x01 else 4
@@ -215,14 +220,11 @@ class SdoClient:
         self._tries += 1
         self._is_segmented = False
         request.result = b""
-        head = request.index.to_bytes(2, "little") + bytes([request.sub])
-        if request.data is None:
-            frame = bytes([0x40]) + head + bytes(4)
-        else:
-            command = 0x23 | (4 - len(request.data)) << 2
-            frame = bytes([command]) + head + request.data.ljust(4, b"\0")
+        data = request.data
+        command = 0x40 if data is None else 0x23 | (4 - len(data)) << 2
+        frame = head(command, request.index, request.sub) + (data or b"")
         self._due = now + self._timeout
-        self._send(Frame(self._cob_id, frame))
+        self._send(Frame(self._cob_id, frame.ljust(8, b"\0")))
 
     def _ask_segment(self, now: float) -> None:
         self._due = now + self._timeout
@@ -231,9 +233,8 @@ class SdoClient:
     def _send_abort(self) -> None:
         request = self._current
         assert request is not None
-        head = request.index.to_bytes(2, "little") + bytes([request.sub])
         code = _TIMED_OUT.to_bytes(4, "little")
-        self._send(Frame(self._cob_id, bytes([_ABORT]) + head + code))
+        self._send(Frame(self._cob_id, head(_ABORT, request.index, request.sub) + code))
 
     def _finish(self, request: SdoRequest) -> None:
         request.is_done = True

@@ -3,7 +3,7 @@
 Source: CiA 301 v4.2.0, 7.2.4.3. Block transfer, optional there, is rejected.
 """
 
-from painter.canopen.protocol.sdo import address_of, expedited_data, segment_data
+from painter.canopen.protocol.sdo import address_of, expedited_data, head, segment_data
 from painter.canopen.sim.store import ObjectStore, SdoAbortError
 
 _UNKNOWN_COMMAND = 0x05040001
@@ -55,11 +55,7 @@ class SdoServer:
             raise SdoAbortError(_UNKNOWN_COMMAND)
         except SdoAbortError as error:
             self.reset()
-            return self._head(0x80) + error.code.to_bytes(4, "little")
-
-    def _head(self, command: int) -> bytes:
-        index, sub = self._key
-        return bytes([command]) + index.to_bytes(2, "little") + bytes([sub])
+            return head(0x80, *self._key) + error.code.to_bytes(4, "little")
 
     def _check_injected(self) -> None:
         if self._key in self.aborts:
@@ -73,7 +69,7 @@ class SdoServer:
         else:
             self._store.find_writable(*self._key)
             self._download = b""
-        return self._head(0x60) + bytes(4)
+        return head(0x60, *self._key) + bytes(4)
 
     def _continue_download(self, request: bytes) -> bytes:
         if self._download is None:
@@ -94,9 +90,9 @@ class SdoServer:
         data = self._store.read(*self._key)
         if 1 <= len(data) <= 4:
             command = 0x43 | (4 - len(data)) << 2
-            return self._head(command) + data.ljust(4, b"\0")
+            return head(command, *self._key) + data.ljust(4, b"\0")
         self._upload = data
-        return self._head(0x41) + len(data).to_bytes(4, "little")
+        return head(0x41, *self._key) + len(data).to_bytes(4, "little")
 
     def _continue_upload(self, request: bytes) -> bytes:
         if self._upload is None:

@@ -82,13 +82,9 @@ class Wire:
             self._free = end
             self.busy_time += end - start
             self.frame_count += 1
-            self.deliver(item.frame, item.port, end)
-
-    def deliver(self, frame: Frame, sender: int, end: float) -> None:
-        """Delivers a frame to all ports but the sender's."""
-        for port, receive in enumerate(self.receivers):
-            if port != sender:
-                receive(frame, end)
+            for port, receive in enumerate(self.receivers):
+                if port != item.port:
+                    receive(item.frame, end)
 
     def _choose(self) -> tuple[float, _Pending]:
         """Returns the start time and the frame that wins the next arbitration."""
