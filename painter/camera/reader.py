@@ -6,7 +6,6 @@ import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from types import TracebackType
 
 from painter.camera.clock import CameraClock
 from painter.camera.config import CameraDriverConfig
@@ -130,12 +129,7 @@ class CameraReader:
     def __enter__(self) -> "CameraReader":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def read(self) -> Reading:

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from types import TracebackType
+from typing import Any
 
 from painter.canopen.config.bus_config import BusConfig
 from painter.canopen.master.arm_bus import ArmBus
@@ -123,8 +123,8 @@ class BusLoop:
                 now = self._clock.now()
                 again = max(0.0, self._clock.machine(self._master.io.repeat_at - now))
                 self._master.poll(now, min(remaining, again))
-                if self._ticker.remaining() > 0.0:
-                    self._pause()
+                if self._master.is_lost:  # There is no transport to wait on.
+                    time.sleep(self._ticker.remaining())
             due, skipped = self._ticker.tick()
             self._master.cycle(due, overruns=skipped)
             self._take_commands()
@@ -139,11 +139,6 @@ class BusLoop:
                     self._is_fifo,
                 )
             )
-
-    def _pause(self) -> None:
-        """Sleeps until the next tick while there is no transport to wait on."""
-        if self._master.is_lost:
-            time.sleep(self._ticker.remaining())
 
     def _has_ended(self) -> bool:
         if self._end_at is None:
@@ -163,15 +158,15 @@ class BusLoop:
             self._master.stop("the program that commands the arm has ended.")
             self._end(_STOP_TIME)
 
-    def _do(self, command: tuple[str, object]) -> None:
+    def _do(self, command: tuple[str, Any]) -> None:
         name, argument = command
         try:
             if name == "push":
-                self._master.push(argument)  # type: ignore[arg-type]
+                self._master.push(argument)
             elif name == "start":
                 self._master.start()
             elif name == "stop":
-                self._master.stop(str(argument))
+                self._master.stop(argument)
             elif name == "acknowledge":
                 self._rejection = ""
                 self._master.acknowledge()
@@ -244,12 +239,7 @@ class BusProcess:
     def __enter__(self) -> "BusProcess":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     @property

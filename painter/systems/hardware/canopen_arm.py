@@ -4,11 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import (
-    Context,
-    EventStatus,
-    State,
-)
+from pydrake.systems.framework import Context, EventStatus, State
 
 from painter.canopen.master.feedback import BusState, Feedback
 from painter.canopen.master.setpoints import Setpoint

@@ -6,11 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import (
-    Context,
-    EventStatus,
-    State,
-)
+from pydrake.systems.framework import Context, EventStatus, State
 from pydrake.systems.sensors import ImageDepth16U, ImageRgba8U
 
 from painter.camera.frames import CameraFrame
