@@ -521,7 +521,7 @@ def test_no_room_is_crowded_and_each_says_its_rule():
         ("painter.canopen.config.units", "pydrake.math.RigidTransform"),
         ("painter.canopen.protocol.sdo", "painter.canopen.master.arm_bus.ArmBus"),
         ("painter.errors", "perception.errors.PerceptionError"),
-        ("models.generate.arm", "painter.config.Scenario"),
+        ("models.generate.looks", "painter.config.Scenario"),
     ],
 )
 def test_the_rules_catch(module, name):

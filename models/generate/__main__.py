@@ -2,19 +2,16 @@
 
 from pathlib import Path
 
-from painter_models.generate.arm import MODEL as ARM
+from painter_models.generate.description import MODELS
 from painter_models.generate.looks import LOOKS
 from painter_models.generate.mesh import write_gltf
-from painter_models.generate.tooling import CAMERA, FRAME, GUN
 from painter_models.generate.urdf import write_urdf
-
-MODELS = (ARM, GUN, CAMERA, FRAME)
 
 
 def generated_files() -> dict[str, str]:
     """Returns the text of every generated file, by its path below models/."""
     files = {}
-    for model in MODELS:
+    for model in MODELS.values():
         files[f"{model.folder}/{model.folder}.urdf"] = write_urdf(model)
         for link in model.links:
             mesh = write_gltf(LOOKS[link.name]())

@@ -2,9 +2,14 @@
 
 import math
 
-from painter_models.generate.arm import FOREARM, SIDE, UPPER_ARM
+from painter_models.generate.description import MODELS
 from painter_models.generate.mesh import Piece, Point, block, hose, plate, rod, turned
-from painter_models.generate.tooling import MAST_TOP
+
+_JOINTS = {joint.name: joint for joint in MODELS["arm"].joints}
+UPPER_ARM = _JOINTS["elbow_pitch"].xyz[0]
+FOREARM = _JOINTS["wrist_pitch"].xyz[0]
+SIDE = 0.115  # The upper arm runs this far beside the forearm.
+MAST_TOP = MODELS["frame"].frames[0].xyz[2]
 
 Outline = list[tuple[float, float]]
 

@@ -1,79 +1,9 @@
 """Writing URDF text from descriptions of links and joints."""
 
-from dataclasses import dataclass, field
+import math
 
-from painter_models.generate.solids import Part, Shape, central_inertia
-
-
-@dataclass(frozen=True, kw_only=True)
-class Link:
-    """One link of a model.
-
-    Attributes:
-        name: Its name, and that of its mesh.
-        parts: What weighs something.
-        collisions: Convex shapes around it.
-    """
-
-    name: str
-    parts: list[Part]
-    collisions: list[Shape]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Joint:
-    """A driven revolute joint.
-
-    Attributes:
-        name: Its name.
-        parent: Link before it.
-        child: Link after it; its frame is the joint's at zero.
-        xyz: Where it sits in the parent, m.
-        axis: Its axis in the child's frame.
-        lower: Lowest position, rad.
-        upper: Highest position, rad.
-        velocity: Greatest speed, rad/s.
-        acceleration: Greatest acceleration, rad/s².
-        effort: Greatest torque at the joint, N m.
-        gear_ratio: Turns of the motor a turn of the joint.
-        rotor_inertia: Of all that turns at motor speed, kg m².
-        damping: Viscous friction at the joint, N m s.
-    """
-
-    name: str
-    parent: str
-    child: str
-    xyz: tuple[float, float, float]
-    axis: str
-    lower: float
-    upper: float
-    velocity: float
-    acceleration: float
-    effort: float
-    gear_ratio: float
-    rotor_inertia: float
-    damping: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class FixedFrame:
-    """A named frame on a link; `xyz` in m, `rpy` in rad."""
-
-    name: str
-    link: str
-    xyz: tuple[float, float, float]
-    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Model:
-    """A URDF file: models/`folder`/`folder`.urdf."""
-
-    folder: str
-    links: list[Link]
-    joints: list[Joint] = field(default_factory=list)
-    frames: list[FixedFrame] = field(default_factory=list)
-
+from painter_models.generate.description import FixedFrame, Joint, Link, Model
+from painter_models.generate.solids import central_inertia
 
 _AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
@@ -157,7 +87,8 @@ def _joint(joint: Joint) -> str:
 
 
 def _frame(frame: FixedFrame) -> str:
+    rpy = tuple(math.radians(angle) for angle in frame.rpy_deg)
     return (
         f'  <frame name="{frame.name}" link="{frame.link}" '
-        f'xyz="{_numbers(frame.xyz)}" rpy="{_numbers(frame.rpy)}"/>\n'
+        f'xyz="{_numbers(frame.xyz)}" rpy="{_numbers(rpy)}"/>\n'
     )
