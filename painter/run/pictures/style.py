@@ -3,6 +3,7 @@
 import io
 from collections.abc import Callable, Sequence
 from functools import wraps
+from pathlib import Path
 from typing import Any, ParamSpec
 
 import matplotlib as mpl
@@ -29,24 +30,9 @@ PALE = "#e4e7eb"
 # The largest region is a background to the others.
 SERIES = ("#d3dae3", BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, YELLOW, "#8c6d31")
 
-_STYLE: Any = {
-    "font.family": "sans-serif",
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.edgecolor": "#9aa5b1",
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.8,
-    "axes.grid": False,
-    "axes.axisbelow": True,
-    "grid.color": PALE,
-    "grid.linewidth": 0.8,
-    "xtick.color": "#52606d",
-    "ytick.color": "#52606d",
-    "text.color": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "figure.facecolor": "white",
-}
+_STYLE = mpl.rc_params_from_file(
+    Path(__file__).with_name("painter.mplstyle"), use_default_template=False
+)
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
@@ -54,7 +40,7 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
     @wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with mpl.rc_context(dict(_STYLE)):
+        with mpl.rc_context(_STYLE):
             return draw(*args, **kwargs)
 
     return wrapper
@@ -134,6 +120,6 @@ def png(figure: Figure, dpi: int = 160) -> bytes:
         Content of the PNG file.
     """
     stream = io.BytesIO()
-    with mpl.rc_context(dict(_STYLE)):
+    with mpl.rc_context(_STYLE):
         figure.savefig(stream, format="png", dpi=dpi)
     return stream.getvalue()
