@@ -3,10 +3,9 @@
 import select
 import socket
 import struct
-from collections.abc import Callable
-from contextlib import suppress
-from functools import partial
-from typing import Any, Protocol, TypeVar
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, Protocol
 
 import can
 
@@ -17,7 +16,6 @@ from painter.errors import BusError
 # One frame in a packet: identifier, length, padding, data; as Linux's struct can_frame.
 _LAYOUT = struct.Struct("<IB3x8s")
 _MOST_AT_ONCE = 256
-T = TypeVar("T")
 
 
 class TransportError(BusError):
@@ -181,20 +179,26 @@ class LocalTransport:
 
     def send(self, frame: Frame) -> None:
         """Sends a frame."""
-        self._do(lambda connection: connection.send(pack_frame(frame)))
+        with self._connected() as connection:
+            connection.send(pack_frame(frame))
 
     def receive(self, timeout: float) -> list[Frame]:
         """Returns received frames; waits up to `timeout` s for the first one."""
         frames: list[Frame] = []
         wait = max(timeout, 0.0)
-        while len(frames) < _MOST_AT_ONCE:
-            packet = self._do(partial(_receive, wait=wait))
-            if packet is None:
-                break
-            frame = unpack_frame(packet)
-            if frame is not None:
-                frames.append(frame)
-            wait = 0.0
+        with self._connected() as connection:
+            while len(frames) < _MOST_AT_ONCE:
+                # select() waits to the microsecond, a socket's own time-out to the
+                # millisecond.
+                if not select.select([connection], [], [], wait)[0]:
+                    break
+                packet = connection.recv(64)
+                if not packet:
+                    raise ConnectionResetError(104, "the peer closed the connection")
+                frame = unpack_frame(packet)
+                if frame is not None:
+                    frames.append(frame)
+                wait = 0.0
         return frames
 
     def close(self) -> None:
@@ -203,25 +207,16 @@ class LocalTransport:
             self._socket.close()
             self._socket = None
 
-    def _do(self, act: Callable[[socket.socket], T]) -> T:
+    @contextmanager
+    def _connected(self) -> Iterator[socket.socket]:
+        """Yields the socket; raises TransportError if it fails or is closed."""
         if self._socket is None:
             raise TransportError(
                 f"local {self._path}: not connected.", code="PNT-BUS-037"
             )
         try:
-            return act(self._socket)
+            yield self._socket
         except OSError as error:
             raise TransportError(
                 f"local {self._path}: {error.strerror}.", code="PNT-BUS-038"
             ) from error
-
-
-def _receive(connection: socket.socket, *, wait: float) -> bytes | None:
-    # select() waits to the microsecond, a socket's own time-out to the millisecond.
-    ready, _, _ = select.select([connection], [], [], wait)
-    if not ready:
-        return None
-    packet = connection.recv(64)
-    if not packet:
-        raise ConnectionResetError(104, "the peer closed the connection")
-    return packet
