@@ -52,7 +52,6 @@ class SimDrive(SimNode):
         *,
         units: AxisUnits,
         brake_time: float = 0.1,
-        home_switch: float = 0.0,
     ) -> None:
         """Creates the drive, switched off at position 0.
 
@@ -62,7 +61,6 @@ class SimDrive(SimNode):
             wire: Of the bus.
             units: Its encoder, and the units of its velocities and accelerations.
             brake_time: Time the brake takes to open, s.
-            home_switch: Motor position of the home switch, counts.
         """
         super().__init__(node_id, description, wire)
         self.motor = Motor()
@@ -70,7 +68,7 @@ class SimDrive(SimNode):
         self.brake_time = brake_time
         self.brake_stuck = False
         self._units = units
-        self.home_switch = home_switch
+        self.home_switch = 0.0
         self._moved = 0.0
         self._offset = 0.0  # Drive position of motor position 0.
         self.store.fix(0x608F, 1, round(units.counts_per_turn))
