@@ -99,17 +99,15 @@ def rod(
     *,
     axis: str | Point = "x",
     bevel: float = 0.003,
-    end_radius: float | None = None,
     sides: int = 40,
 ) -> Piece:
-    """Makes a closed cylinder or cone with bevelled edges, from `start` on."""
-    last = radius if end_radius is None else end_radius
+    """Makes a closed cylinder with bevelled edges, from `start` on."""
     profile = [
         (0.0, 0.0),
         (0.0, radius - bevel),
         (bevel, radius),
-        (length - bevel, last),
-        (length, last - bevel),
+        (length - bevel, radius),
+        (length, radius - bevel),
         (length, 0.0),
     ]
     return turned(material, profile, start=start, axis=axis, sides=sides)
@@ -184,10 +182,9 @@ def block(material: str, center: Point, size: Point, *, bevel: float = 0.003) ->
     )
 
 
-def hose(
-    material: str, points: list[Point], radius: float, *, sides: int = 12
-) -> Piece:
-    """Makes a smooth tube along a Catmull-Rom curve through points."""
+def hose(material: str, points: list[Point], radius: float) -> Piece:
+    """Makes a smooth tube of 12 sides along a Catmull-Rom curve through points."""
+    sides = 12
     p = np.array(points)
     p = np.concatenate([[2 * p[0] - p[1]], p, [2 * p[-1] - p[-2]]])
     t = np.linspace(0.0, 1.0, 9)[:-1, None]

@@ -87,8 +87,12 @@ class Part:
     mass: float
 
 
-def spatial_inertia(parts: list[Part]) -> SpatialInertia:
-    """Adds up the parts of a link, about the link's origin and in its axes."""
+def central_inertia(parts: list[Part]) -> tuple[float, np.ndarray, np.ndarray]:
+    """Adds up the parts of a link.
+
+    Returns:
+        Mass (kg), centre of mass (3,) and inertia (3, 3) about it, kg m².
+    """
     total = SpatialInertia.Zero()
     for part in parts:
         moments = part.shape.central_moments()
@@ -97,12 +101,6 @@ def spatial_inertia(parts: list[Part]) -> SpatialInertia:
             p_PScm_E=np.array(part.shape.center),
             I_SScm_E=RotationalInertia(*(part.mass * moments)),
         )
-    return total
-
-
-def central_inertia(parts: list[Part]) -> tuple[float, np.ndarray, np.ndarray]:
-    """Returns mass (kg), centre of mass (3,) and inertia (3, 3) about it, kg m²."""
-    inertia = spatial_inertia(parts)
-    mass, p_LLcm = inertia.get_mass(), inertia.get_com()
-    unit: UnitInertia = inertia.Shift(p_LLcm).get_unit_inertia()
+    mass, p_LLcm = total.get_mass(), total.get_com()
+    unit: UnitInertia = total.Shift(p_LLcm).get_unit_inertia()
     return mass, p_LLcm, mass * unit.CopyToFullMatrix3()
