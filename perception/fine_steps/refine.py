@@ -17,7 +17,7 @@ from perception.fine_steps.outlines import straighten
 from perception.fine_steps.steps import StepDetection, find_steps, sub_cells
 from perception.fine_steps.unseen import Reason, close_gaps, explain
 from perception.fine_steps.votes import point_votes, wall_share
-from perception.fine_steps.wall_surface import fit_wall_surface
+from perception.fine_steps.wall_surface import blocks_of, fit_wall_surface
 from perception.ground import BoolArray, FloatArray, IntArray
 from perception.paper_steps.regions import drop_specks, sort_by_area
 from perception.values import SurfaceMap, WallSegmentation
@@ -92,7 +92,7 @@ def refine_segmentation(
     steps = find_steps(fine, surface, cell=cell / split, config=config)
     votes = point_votes(fine, steps, surface)
     share = wall_share(votes, (ny, nx), cell=cell, spacing=spacing)
-    seen = np.asarray(np.isfinite(_blocks(steps.residual, split)).any(axis=2))
+    seen = np.asarray(np.isfinite(blocks_of(steps.residual, split)).any(axis=2))
     gap = close_gaps(seen, spacing=spacing, cell=cell)
     hole = ~seen & ~gap
     level = _fill(seen & (share > _MAJORITY), seen, gap)
@@ -131,18 +131,11 @@ def _threads() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _blocks(grid: Grid, split: int) -> Grid:
-    """Returns (ny, nx, split²): the sub-cells of each cell."""
-    ny, nx = (size // split for size in grid.shape)
-    blocks = grid.reshape(ny, split, nx, split).transpose(0, 2, 1, 3)
-    return blocks.reshape(ny, nx, split**2)
-
-
 def _mean_residual(steps: StepDetection, level: BoolArray, split: int) -> FloatArray:
     """Returns each cell's mean residual, m, over its sub-cells of the same level."""
-    residual = _blocks(steps.residual, split)
+    residual = blocks_of(steps.residual, split)
     known = np.isfinite(residual)
-    alike = known & (_blocks(steps.level, split) == level[:, :, np.newaxis])
+    alike = known & (blocks_of(steps.level, split) == level[:, :, np.newaxis])
     alike = np.where(alike.any(axis=2, keepdims=True), alike, known)
     total = np.where(alike, residual, 0.0).sum(axis=2)
     with np.errstate(invalid="ignore"):
@@ -201,7 +194,7 @@ def _confidence(
     """
     margin = np.abs(np.abs(steps.residual) - steps.bound)
     sure = erf(margin / (math.sqrt(2.0) * np.maximum(steps.sigma, 1e-6)))
-    blocks = _blocks(sure, split)
+    blocks = blocks_of(sure, split)
     known = np.isfinite(blocks)
     mean = np.where(known, blocks, 0.0).sum(axis=2) / np.maximum(known.sum(axis=2), 1)
     confidence = mean * np.abs(2.0 * share - 1.0)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, uniform_filter
 
 from perception.config import SegmentationConfig
-from perception.fine_steps.wall_surface import WallSurface
+from perception.fine_steps.wall_surface import WallSurface, blocks_of
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
 _OUTLIER_SHARE = 0.3
@@ -207,15 +207,11 @@ def _scatter(residual: FloatArray, noise: float, cell: float) -> FloatArray:
     size = max(1, round(_BLOCK / cell))
     off = np.abs(residual)
     off = np.where(off <= max(0.005, 8.0 * noise), off, np.nan)
-    rows, columns = -(-ny // size), -(-nx // size)
-    padded = np.full((rows * size, columns * size), np.nan)
-    padded[:ny, :nx] = off
-    blocks = padded.reshape(rows, size, columns, size).transpose(0, 2, 1, 3)
-    blocks = np.sort(blocks.reshape(rows * columns, -1), axis=1)
-    known = np.count_nonzero(np.isfinite(blocks), axis=1)
+    blocks = np.sort(blocks_of(off, size), axis=2)
+    known = np.count_nonzero(np.isfinite(blocks), axis=2)
     whole = float(np.nanmedian(off)) if np.isfinite(off).any() else 0.0
-    middle = blocks[np.arange(known.size), np.maximum(known - 1, 0) // 2]
+    middle = np.maximum(known - 1, 0)[..., np.newaxis] // 2
+    middle = np.take_along_axis(blocks, middle, axis=2)[..., 0]
     # A block with little wall takes the scatter of the whole tile.
-    middle = np.where(known >= _LEAST_SAMPLES, middle, whole)
-    middle = 1.4826 * middle.reshape(rows, columns)
+    middle = 1.4826 * np.where(known >= _LEAST_SAMPLES, middle, whole)
     return np.repeat(np.repeat(middle, size, axis=0), size, axis=1)[:ny, :nx]

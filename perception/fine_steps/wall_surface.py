@@ -15,6 +15,7 @@ splines see `perception.fine_steps.spline_surface`.
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -36,6 +37,7 @@ _NEIGHBOURED = 0.9
 """Share of blocks beside which there is another, from which they show steps."""
 _EDGE_BLOCKS = 3.0
 _LEAST_CELLS = 500
+Grid = TypeVar("Grid", BoolArray, FloatArray)
 _NEAR = 0.03  # Standard deviation about T's plane within which the wall is searched.
 
 
@@ -176,15 +178,29 @@ def _owners(
     return owner
 
 
+def blocks_of(grid: Grid, size: int) -> Grid:
+    """Cuts a grid into square blocks.
+
+    Args:
+        grid: (ny, nx).
+        size: Edge of a block, cells. Only a grid of numbers may end within a block.
+
+    Returns:
+        (my, mx, size²) the cells of each block; NaN beyond the grid.
+    """
+    beyond = [(0, -count % size) for count in grid.shape]
+    if np.any(beyond):
+        grid = np.pad(grid, beyond, constant_values=np.nan)
+    ny, nx = (count // size for count in grid.shape)
+    blocks = grid.reshape(ny, size, nx, size).transpose(0, 2, 1, 3)
+    return blocks.reshape(ny, nx, size**2)
+
+
 def _block_medians(depth: FloatArray, step: int) -> FloatArray:
     """Returns the medians of blocks of step x step cells; NaN where all are."""
     if step == 1:
         return depth
-    ny, nx = (-(-size // step) for size in depth.shape)
-    padded = np.full((ny * step, nx * step), np.nan)
-    padded[: depth.shape[0], : depth.shape[1]] = depth
-    blocks = padded.reshape(ny, step, nx, step).transpose(0, 2, 1, 3)
-    blocks = np.sort(blocks.reshape(ny, nx, -1), axis=2)  # NaN comes last.
+    blocks = np.sort(blocks_of(depth, step), axis=2)  # NaN comes last.
     known = np.count_nonzero(np.isfinite(blocks), axis=2)
     # The mean of the two in the middle: the lower one alone sinks on a slope.
     middle = [np.maximum(known - 1, 0) // 2, known // 2]

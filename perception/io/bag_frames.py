@@ -6,15 +6,16 @@ of its own:
     python -m perception.io.bag_frames RECORDING FOLDER
 """
 
-import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from perception.io.bags import depth_groups, intrinsics_of, play_apart
+from perception.io.bags import depth_groups, intrinsics_of, main_apart, play_apart
 from perception.io.camera_file import CAMERA_FILE, write_camera
+from perception.io.frames import write_pictures
 
 TIMEOUT = 1800.0
 """Longest time that unpacking may take, s."""
@@ -38,31 +39,28 @@ def unpack_bag(path: Path, folder: Path) -> None:
 
 
 def _play(path: str, folder: Path) -> None:
-    """Plays a recording into files; its camera comes with the first picture."""
+    """Plays a recording into files."""
+    write_pictures(folder, _pictures(path, folder / CAMERA_FILE), png=_QUICK_PNG)
+
+
+def _pictures(path: str, camera: Path) -> Iterator[tuple[float, Any, Any]]:
+    """Yields time, depth and colour; the camera's file comes with the first of them."""
     import pyrealsense2 as rs
 
     align = rs.align(rs.stream.depth)
-    for name in ("rgb", "depth"):
-        (folder / name).mkdir()
     last = -1.0
-    with (folder / "rgb.txt").open("w") as rgb, (folder / "depth.txt").open("w") as dep:
-        for frame, group in depth_groups(path):
-            time = frame.get_timestamp() / 1000.0
-            if time <= last:
-                continue
-            if last < 0.0:
-                camera = folder / CAMERA_FILE
-                write_camera(camera, intrinsics_of(frame), frame.get_units())
-            color = group.get_color_frame()
-            if color:
-                color = align.process(group).get_color_frame()
-            last, stamp = time, f"{time:.6f}"
-            depth = np.array(frame.get_data())
-            picture = _as_bgr(color, depth.shape)
-            cv2.imwrite(str(folder / f"depth/{stamp}.png"), depth, _QUICK_PNG)
-            cv2.imwrite(str(folder / f"rgb/{stamp}.png"), picture, _QUICK_PNG)
-            rgb.write(f"{stamp} rgb/{stamp}.png\n")
-            dep.write(f"{stamp} depth/{stamp}.png\n")
+    for frame, group in depth_groups(path):
+        time = frame.get_timestamp() / 1000.0
+        if time <= last:
+            continue
+        if last < 0.0:
+            write_camera(camera, intrinsics_of(frame), frame.get_units())
+        color = group.get_color_frame()
+        if color:
+            color = align.process(group).get_color_frame()
+        last = time
+        depth = np.array(frame.get_data())
+        yield time, depth, _as_bgr(color, depth.shape)
 
 
 def _as_bgr(frame: Any, shape: tuple[int, ...]) -> Any:
@@ -78,12 +76,5 @@ def _as_bgr(frame: Any, shape: tuple[int, ...]) -> Any:
     raise ValueError(f"colour format {kind} is unknown; known: rgb8, bgr8")
 
 
-def _main() -> None:
-    try:
-        _play(sys.argv[1], Path(sys.argv[2]))
-    except (RuntimeError, ValueError) as error:
-        raise SystemExit(" ".join(str(error).split())) from None
-
-
 if __name__ == "__main__":
-    _main()
+    main_apart(_play)

@@ -11,7 +11,7 @@ import itertools
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -133,8 +133,21 @@ def intrinsics_of(frame: Any) -> CameraIntrinsics:
     return CameraIntrinsics.from_librealsense(lens)
 
 
-def _play(path: str) -> tuple[Any, Any]:
-    """Plays a recording; returns the depth in units and the camera's numbers."""
+def main_apart(play: Callable[[str, Path], None]) -> None:
+    """Plays a recording as the program that `play_apart` starts.
+
+    Args:
+        play: Gets the paths of recording and result; its RuntimeError or ValueError
+            says why it failed.
+    """
+    try:
+        play(sys.argv[1], Path(sys.argv[2]))
+    except (RuntimeError, ValueError) as error:
+        raise SystemExit(" ".join(str(error).split())) from None
+
+
+def _play(path: str, out: Path) -> None:
+    """Plays a recording; writes the depth in units and the camera's numbers."""
     import pyrealsense2 as rs
 
     frames: list[Any] = []
@@ -142,17 +155,9 @@ def _play(path: str) -> tuple[Any, Any]:
         scale = frame.get_units()
         camera = intrinsics_of(frame)
         frames.append(np.array(frame.get_data()))
-    numbers = [camera.fx, camera.fy, camera.cx, camera.cy, scale]
-    return median_depth(frames), numbers
-
-
-def _main() -> None:
-    try:
-        depth, camera = _play(sys.argv[1])
-    except (RuntimeError, ValueError) as error:
-        raise SystemExit(" ".join(str(error).split())) from None
-    np.savez(sys.argv[2], depth=depth, camera=np.array(camera))
+    numbers = np.array([camera.fx, camera.fy, camera.cx, camera.cy, scale])
+    np.savez(out, depth=median_depth(frames), camera=numbers)
 
 
 if __name__ == "__main__":
-    _main()
+    main_apart(_play)

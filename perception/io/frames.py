@@ -1,7 +1,7 @@
 """RGB-D frames and the folders they are recorded in."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -152,25 +152,46 @@ def write_recording(
         Number of frames.
     """
     write_camera(folder / CAMERA_FILE, intrinsics)
-    for name in ("rgb", "depth"):
-        (folder / name).mkdir(exist_ok=True)
     truth, arm = [], []
-    with (folder / "rgb.txt").open("w") as rgb, (folder / "depth.txt").open("w") as dep:
+
+    def pictures() -> Iterator[tuple[float, DepthImage, ColorImage]]:
         for frame, X_WC in frames:
-            stamp = f"{frame.time:.6f}"
             units = np.rint(frame.depth_mm * (DEPTH_UNITS_PER_M / 1000.0))
             depth = np.where(units > 65535, 0, units).astype(np.uint16)
-            cv2.imwrite(str(folder / f"depth/{stamp}.png"), depth)
-            cv2.imwrite(str(folder / f"rgb/{stamp}.png"), frame.color[:, :, ::-1])
-            rgb.write(f"{stamp} rgb/{stamp}.png\n")
-            dep.write(f"{stamp} depth/{stamp}.png\n")
+            yield frame.time, depth, frame.color[:, :, ::-1]
             truth.append((frame.time, X_WC))
             if frame.X_WC is not None:
                 arm.append((frame.time, frame.X_WC))
+
+    write_pictures(folder, pictures())
     write_poses(folder / TRUTH_FILE, truth)
     if arm:
         write_poses(folder / ARM_FILE, arm)
     return len(truth)
+
+
+def write_pictures(
+    folder: Path,
+    pictures: Iterable[tuple[float, DepthImage, ColorImage]],
+    *,
+    png: Sequence[int] = (),
+) -> None:
+    """Writes rgb/, depth/, rgb.txt and depth.txt of TUM's form.
+
+    Args:
+        folder: Existing folder.
+        pictures: Time, s, depth in the file's units and colour (BGR) of each frame.
+        png: OpenCV's options of PNG.
+    """
+    for name in ("rgb", "depth"):
+        (folder / name).mkdir(exist_ok=True)
+    with (folder / "rgb.txt").open("w") as rgb, (folder / "depth.txt").open("w") as dep:
+        for time, depth, color in pictures:
+            stamp = f"{time:.6f}"
+            cv2.imwrite(str(folder / f"depth/{stamp}.png"), depth, png)
+            cv2.imwrite(str(folder / f"rgb/{stamp}.png"), color, png)
+            rgb.write(f"{stamp} rgb/{stamp}.png\n")
+            dep.write(f"{stamp} depth/{stamp}.png\n")
 
 
 def write_poses(path: Path, poses: Iterable[tuple[float, RigidTransform]]) -> None:

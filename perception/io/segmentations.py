@@ -16,10 +16,8 @@ from perception.values import Opening, WallSegmentation
 
 _FIELDS = ("labels", "depth", "wall_mask", "X_WT", "cell")
 _EXTRAS = ("surface", "normals", "confidence", "reason")  # Of fine steps alone.
-_OPENINGS = tuple(
-    f"opening_{name}"
-    for name in ("kind", "area", "depth", "glass_share", "corners", "p_TVs")
-)
+_NUMBERS = ("kind", "area", "depth", "glass_share")
+_OPENINGS = tuple(f"opening_{name}" for name in (*_NUMBERS, "corners", "p_TVs"))
 
 
 def save_segmentation(path: Path, segmentation: WallSegmentation) -> None:
@@ -36,21 +34,11 @@ def save_segmentation(path: Path, segmentation: WallSegmentation) -> None:
             `opening_p_TVs` (2, n) m in T, `opening_corners` (k,) of each.
         segmentation: What to write.
     """
-    extras: dict[str, Any] = {
-        name: getattr(segmentation, name)
-        for name in _EXTRAS
-        if getattr(segmentation, name) is not None
-    }
-    extras |= _opening_arrays(segmentation.openings)
-    np.savez_compressed(
-        path,
-        labels=segmentation.labels,
-        depth=segmentation.depth,
-        wall_mask=segmentation.wall_mask,
-        X_WT=segmentation.X_WT.GetAsMatrix4(),
-        cell=np.float64(segmentation.cell),
-        **extras,
-    )
+    values = {name: getattr(segmentation, name) for name in (*_FIELDS, *_EXTRAS)}
+    values["X_WT"] = segmentation.X_WT.GetAsMatrix4()
+    arrays = {name: value for name, value in values.items() if value is not None}
+    arrays |= _opening_arrays(segmentation.openings)
+    np.savez_compressed(path, **arrays)
 
 
 def load_segmentation(path: Path) -> WallSegmentation:
@@ -130,8 +118,7 @@ def _opening_arrays(openings: tuple[Opening, ...]) -> dict[str, npt.NDArray[Any]
     if not openings:
         return {}
     columns = [
-        np.array([getattr(opening, name) for opening in openings])
-        for name in ("kind", "area", "depth", "glass_share")
+        np.array([getattr(opening, name) for opening in openings]) for name in _NUMBERS
     ]
     outlines = [opening.p_TVs for opening in openings]
     columns.append(np.array([outline.shape[1] for outline in outlines]))
@@ -158,16 +145,8 @@ def _openings(arrays: dict[str, npt.NDArray[Any]]) -> tuple[Opening, ...]:
         )
     outlines = np.split(p_TVs, np.cumsum(corners)[:-1], axis=1)
     return tuple(
-        Opening(
-            kind=str(kind),
-            p_TVs=outline,
-            area=float(area),
-            depth=float(depth),
-            glass_share=float(glass_share),
-        )
-        for kind, area, depth, glass_share, outline in zip(
-            *columns, outlines, strict=True
-        )
+        Opening(str(kind), outline, *map(float, numbers))
+        for kind, *numbers, outline in zip(*columns, outlines, strict=True)
     )
 
 

@@ -86,11 +86,9 @@ def segment_file(
         with np.errstate(over="ignore"):
             offsets = points - (np.zeros(3) if p_WC is None else p_WC)[:, None]
             points = points[:, np.linalg.norm(offsets, axis=0) <= max_range]
-    width, height = (None, None) if tile is None else tile
     return segment_recorded(
         points,
-        width=width,
-        height=height,
+        tile=tile,
         config=config,
         seed=seed,
         up_W=up,

@@ -66,8 +66,7 @@ def segment_recorded(
     *,
     config: SegmentationConfig,
     seed: int,
-    width: float | None = None,
-    height: float | None = None,
+    tile: tuple[float, float] | None = None,
     up_W: FloatArray | None = None,
     distance: float | None = None,
     p_WC: FloatArray | None = None,
@@ -86,8 +85,7 @@ def segment_recorded(
         p_WQs: (3, N) m, in the recording's frame W.
         config: Thresholds of the steps.
         seed: Of RANSAC's random triples.
-        width: Of the tile, m; if left out, as wide as what is seen of the wall.
-        height: Of the tile, m; likewise.
+        tile: Its width and height, m; if left out, of all that is seen of the wall.
         up_W: (3,) which way is up; if left out, the picture's -y is taken for T's
             orientation and floors are not told from walls.
         distance: Expected distance of the wall, m; `config.wall_distance_tolerance` is
@@ -130,31 +128,28 @@ def segment_recorded(
         shown = shown[:, (depth >= -set_back) & (depth <= limit)]
     middle, extent = robust_extent(shown)
     middle[2] = np.median(p_TQs[2])
-    size = (
-        extent[0] if width is None else width,
-        extent[1] if height is None else height,
-    )
+    width, height = extent[:2] if tile is None else tile
     cell = least_cell = config.cell
     most = MAX_FINE_CELLS if fine else MAX_CELLS
     if fit_cell:
         cell = fitting_cell(p_TQs[:2], least=cell)
-        cell = max(cell, math.sqrt(size[0] * size[1] / most))
-    elif size[0] * size[1] > most * cell**2:
-        enough = math.ceil(1e4 * math.sqrt(size[0] * size[1] / most)) / 1e4
+        cell = max(cell, math.sqrt(width * height / most))
+    elif width * height > most * cell**2:
+        enough = math.ceil(1e4 * math.sqrt(width * height / most)) / 1e4
         raise GridSizeError(
-            f"a tile of {size[0]:g} x {size[1]:g} m with cells of {cell:g} m has more "
+            f"a tile of {width:g} x {height:g} m with cells of {cell:g} m has more "
             f"than {most} cells; take a smaller tile or cells of {enough:g} m.",
             code="PNT-WALL-008",
         )
-    # An extent from the data is a whole number of cells.
-    tile = TileSize(
-        width=size[0] if width is not None else _whole(size[0], cell),
-        height=size[1] if height is not None else _whole(size[1], cell),
-    )
-    X_WT = RigidTransform(R_WT, R_WT @ (middle - tile.p_TC))
-    wall = wall_on_plane(plane, X_WT, tile, total=found.kept_count)
+    if tile is None:  # An extent from the data is a whole number of cells.
+        width, height = (
+            max(1, math.ceil(length / cell)) * cell for length in (width, height)
+        )
+    size = TileSize(width, height)
+    X_WT = RigidTransform(R_WT, R_WT @ (middle - size.p_TC))
+    wall = wall_on_plane(plane, X_WT, size, total=found.kept_count)
     config = dataclasses.replace(config, cell=cell, distance_threshold=limit)
-    stages = segment_tile(found, wall, number + 1, tile, config=config)
+    stages = segment_tile(found, wall, number + 1, size, config=config)
     if fine:
         kept = SurfaceMap.of_points(found.p_WQs[:, found.kept])
         result = refine_segmentation(
@@ -218,7 +213,3 @@ def _across(up_W: FloatArray, normal_W: FloatArray) -> FloatArray:
     ):
         return np.roll(up_W, 1)
     return up_W
-
-
-def _whole(length: float, cell: float) -> float:
-    return max(1, math.ceil(length / cell)) * cell

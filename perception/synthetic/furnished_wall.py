@@ -5,6 +5,7 @@ map has them, with blurred and mixed edges, glass and strays, to compare whole
 segmentations with one another and with the truth.
 """
 
+import functools
 import math
 from dataclasses import dataclass
 from enum import IntEnum
@@ -95,7 +96,11 @@ def furnished_wall(
         The cloud and its truth.
     """
     rng = np.random.default_rng(seed)
-    layout = _Layout(rng.uniform(-0.03, 0.03, (6, 2)), rng.uniform(-0.1, 0.1))
+    surface = functools.partial(
+        _surface,
+        shifts=rng.uniform(-0.03, 0.03, (6, 2)),
+        lean=rng.uniform(-0.1, 0.1),
+    )
     strays = round(stray_share * points)
     # Glass keeps at most 5 % of the points; the surplus is cut off at the end.
     side = math.sqrt(1.05 * (points - strays)) / (EDGE + 2 * MARGIN)
@@ -103,9 +108,9 @@ def furnished_wall(
     lattice = np.arange(round((EDGE + 2 * MARGIN) * side)) / side - MARGIN
     x, y = (axis.ravel() for axis in np.meshgrid(lattice, lattice))
     x, y = (axis + rng.uniform(0.0, 1.0 / side, axis.size) for axis in (x, y))
-    z, _, glass = layout.surface(x, y)
+    z, _, glass = surface(x, y)
     beside = rng.normal(0.0, edge_blur, (2, x.size))
-    z_beside, _, _ = layout.surface(x + beside[0], y + beside[1])
+    z_beside, _, _ = surface(x + beside[0], y + beside[1])
     share = np.where(rng.random(x.size) < 0.5, rng.random(x.size), 1.0)
     z = z + share * (z_beside - z) + rng.normal(0.0, noise, x.size)
     fate = rng.random(x.size)
@@ -122,63 +127,56 @@ def furnished_wall(
     p_TQs = rng.permutation(p_TQs, axis=1)[:, :points]
     p_CQs = (X_CT @ p_TQs).astype(np.float32)
     centres = (np.arange(round(EDGE / cell)) + 0.5) * cell
-    _, things, _ = layout.surface(*np.meshgrid(centres, centres))
+    _, things, _ = surface(*np.meshgrid(centres, centres))
     return FurnishedWall(p_CQs.astype(np.float64), things, X_CT, cell)
 
 
-class _Layout:
-    """Where things are: depth, `Thing` and glass at places of the tile."""
+def _surface(
+    x: FloatArray, y: FloatArray, *, shifts: FloatArray, lean: float
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Returns depth (m along T z), `Thing` and whether it is glass, by place.
 
-    def __init__(self, shifts: FloatArray, lean: float) -> None:
-        """Takes (6, 2) shifts of the things, m, and the stick's slope."""
-        self._shifts = shifts
-        self._lean = lean
+    Args:
+        x: Places of the tile, m.
+        y: The same.
+        shifts: (6, 2) of the things, m.
+        lean: The stick's slope.
+    """
+    z = np.zeros(x.shape)
+    things = np.full(x.shape, int(Thing.WALL))
+    glass = np.zeros(x.shape, dtype=np.bool_)
 
-    def surface(
-        self, x: FloatArray, y: FloatArray
-    ) -> tuple[FloatArray, IntArray, BoolArray]:
-        """Returns depth (m along T z), `Thing` and whether it is glass, by place."""
-        z = np.zeros(x.shape)
-        things = np.full(x.shape, int(Thing.WALL))
-        glass = np.zeros(x.shape, dtype=np.bool_)
+    def put(thing: Thing, where: BoolArray, depth: FloatArray | float) -> None:
+        z[where] = np.broadcast_to(depth, x.shape)[where]
+        things[where] = thing
 
-        def put(thing: Thing, where: BoolArray, depth: FloatArray | float) -> None:
-            z[where] = np.broadcast_to(depth, x.shape)[where]
-            things[where] = thing
-
-        shifts = self._shifts
-        # Window 0.6 x 0.7 m with a 6 cm frame, door, two boxes; all in metres.
-        put(Thing.WINDOW, _box(x, y, 0.50, 1.35, 0.60, 0.70, shifts[0]), -0.12)
-        glass |= _box(x, y, 0.50, 1.35, 0.48, 0.58, shifts[0])
-        put(Thing.DOOR, _box(x, y, 1.55, 0.74, 0.60, 1.40, shifts[1]), -0.07)
-        put(Thing.BOX, _box(x, y, 0.25, 0.55, 0.20, 0.20, shifts[2]), 0.10)
-        put(Thing.BOX, _box(x, y, 0.65, 0.70, 0.15, 0.12, shifts[3]), 0.06)
-        # A bottle that touches the wall: body 8 cm, neck 3 cm across, 27 cm tall.
-        middle, bottom = 0.70 + shifts[4, 0], 0.25 + shifts[4, 1]
-        for low, high, radius in ((0.0, 0.19, 0.04), (0.19, 0.27, 0.015)):
-            off = x - middle
-            round_ = (np.abs(off) < radius) & (y >= bottom + low) & (y < bottom + high)
-            bulge = np.sqrt(np.maximum(0.0, radius**2 - off**2))
-            put(Thing.BOTTLE, round_, 0.04 + bulge)
-        # A round stick, 3 cm across and 1.2 m long, leaning, its axis 2.5 cm off.
-        off = x - (1.05 + shifts[5, 0] + self._lean * (y - 0.9))
-        off /= math.hypot(1.0, self._lean)
-        stick = (np.abs(off) < 0.015) & (np.abs(y - 0.9) < 0.6)
-        bulge = np.sqrt(np.maximum(0.0, 0.015**2 - off**2))
-        put(Thing.STICK, stick, 0.025 + bulge)
-        return z, things, glass
+    # Window 0.6 x 0.7 m with a 6 cm frame, door, two boxes; all in metres.
+    put(Thing.WINDOW, _box(x, y, (0.50, 1.35, 0.60, 0.70), shifts[0]), -0.12)
+    glass |= _box(x, y, (0.50, 1.35, 0.48, 0.58), shifts[0])
+    put(Thing.DOOR, _box(x, y, (1.55, 0.74, 0.60, 1.40), shifts[1]), -0.07)
+    put(Thing.BOX, _box(x, y, (0.25, 0.55, 0.20, 0.20), shifts[2]), 0.10)
+    put(Thing.BOX, _box(x, y, (0.65, 0.70, 0.15, 0.12), shifts[3]), 0.06)
+    # A bottle that touches the wall: body 8 cm, neck 3 cm across, 27 cm tall.
+    middle, bottom = 0.70 + shifts[4, 0], 0.25 + shifts[4, 1]
+    for low, high, radius in ((0.0, 0.19, 0.04), (0.19, 0.27, 0.015)):
+        off = x - middle
+        round_ = (np.abs(off) < radius) & (y >= bottom + low) & (y < bottom + high)
+        bulge = np.sqrt(np.maximum(0.0, radius**2 - off**2))
+        put(Thing.BOTTLE, round_, 0.04 + bulge)
+    # A round stick, 3 cm across and 1.2 m long, leaning, its axis 2.5 cm off.
+    off = x - (1.05 + shifts[5, 0] + lean * (y - 0.9))
+    off /= math.hypot(1.0, lean)
+    stick = (np.abs(off) < 0.015) & (np.abs(y - 0.9) < 0.6)
+    bulge = np.sqrt(np.maximum(0.0, 0.015**2 - off**2))
+    put(Thing.STICK, stick, 0.025 + bulge)
+    return z, things, glass
 
 
 def _box(
-    x: FloatArray,
-    y: FloatArray,
-    middle_x: float,
-    middle_y: float,
-    width: float,
-    height: float,
-    shift: FloatArray,
+    x: FloatArray, y: FloatArray, box: tuple[float, ...], shift: FloatArray
 ) -> BoolArray:
-    """Returns which places are in an upright rectangle about a shifted middle."""
+    """Returns which places are in a rectangle: middle x and y, width and height."""
+    middle_x, middle_y, width, height = box
     across: BoolArray = np.abs(x - middle_x - shift[0]) <= width / 2
     across &= np.abs(y - middle_y - shift[1]) <= height / 2
     return across

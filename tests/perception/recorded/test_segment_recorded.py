@@ -25,12 +25,10 @@ X_WALL = RigidTransform(
 )
 
 
-def segment(points, *, width=2.0, height=2.0, **options):
+def segment(points, *, tile=(2.0, 2.0), **options):
     """Segments a recording with the default thresholds."""
     config = options.pop("config", SegmentationConfig())
-    return segment_recorded(
-        points, width=width, height=height, config=config, seed=1, **options
-    ).stages
+    return segment_recorded(points, tile=tile, config=config, seed=1, **options).stages
 
 
 def wall(patches=()):
@@ -61,7 +59,7 @@ def test_cells_grow_where_a_wall_is_too_large_for_them(fine, cell):
     # Points 1 cm apart, so that 400 000 cells are too few for 64 m² and 4 million not.
     x, y = np.meshgrid(np.arange(-4.0, 4.0, 0.01), np.arange(-4.0, 4.0, 0.01))
     points = np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
-    found = segment(points, width=8.0, height=8.0, fit_cell=True, fine=fine)
+    found = segment(points, tile=(8.0, 8.0), fit_cell=True, fine=fine)
     assert found.segmentation.cell == pytest.approx(cell, rel=1e-3)
 
 
@@ -151,7 +149,7 @@ def test_walls_of_another_painting_robot_are_found(name, distance, normal):
     points = read_cloud(DATA / "painting_robot_wall_scans" / f"{name}.pcd").p_WQs
     # Scan lines are 2 to 5 cm apart; z points down.
     config = SegmentationConfig(cell=0.05)
-    stages = segment(points, width=4.0, height=4.0, up_W=-UP_Z, config=config)
+    stages = segment(points, tile=(4.0, 4.0), up_W=-UP_Z, config=config)
     plane = stages.found.planes[stages.wall_plane - 1]
     # The scans are noisy by 12 mm and the swaying one by 5 cm and more.
     assert abs(plane.offset) == pytest.approx(distance, abs=0.02)
