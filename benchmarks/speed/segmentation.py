@@ -99,13 +99,7 @@ def run_ours(
     times["MB"] = (memory("VmHWM") - before) / 1e6
     times["whole"] = times["total"] + times["refine"]
     with timed(times, "planes"):
-        segment_planes(
-            points,
-            threshold=config.distance_threshold,
-            stop_fraction=config.stop_fraction,
-            max_planes=config.max_planes,
-            rng=np.random.default_rng(0),
-        )
+        segment_planes(points, config=config, rng=np.random.default_rng(0))
     times["filter"] = times["total"] - times["tile"] - times["planes"]
     coarse = stages.segmentation.wall_mask
     return times, Outcome(found.kept, plane, coarse, fine.wall_mask)

@@ -96,11 +96,7 @@ def find_planes(
     )
     labels = np.zeros(kept.size, dtype=np.int64)
     labels[kept], planes = segment_planes(
-        p_WQs.compress(kept, axis=1),
-        threshold=config.distance_threshold,
-        stop_fraction=config.stop_fraction,
-        max_planes=config.max_planes,
-        rng=np.random.default_rng(seed),
+        p_WQs.compress(kept, axis=1), config=config, rng=np.random.default_rng(seed)
     )
     return FoundPlanes(p_WQs=p_WQs, kept=kept, labels=labels, planes=planes)
 

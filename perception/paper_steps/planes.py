@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from perception.config import SegmentationConfig
 from perception.ground import BoolArray, FloatArray, FrozenValue, IntArray
 
 # Points on which candidate planes are scored; the share of inliers is then known to
@@ -121,12 +122,7 @@ def ransac_plane(
 
 
 def segment_planes(
-    p_WQs: FloatArray,
-    *,
-    threshold: float,
-    stop_fraction: float,
-    max_planes: int,
-    rng: np.random.Generator,
+    p_WQs: FloatArray, *, config: SegmentationConfig, rng: np.random.Generator
 ) -> tuple[IntArray, tuple[Plane, ...]]:
     """Removes plane after plane from a cloud.
 
@@ -134,9 +130,7 @@ def segment_planes(
 
     Args:
         p_WQs: (3, N) finite, m, in any frame.
-        threshold: Largest distance of an inlier, m.
-        stop_fraction: Ends when fewer points than this share of N remain.
-        max_planes: Ends after so many planes.
+        config: `distance_threshold`, `stop_fraction` and `max_planes` are used.
         rng: Source of the triples.
 
     Returns:
@@ -147,8 +141,9 @@ def segment_planes(
     # Axis by axis, whatever the caller's order; `compress` keeps it so.
     rest, points = np.arange(labels.size), np.ascontiguousarray(p_WQs)
     planes: list[Plane] = []
-    while len(planes) < max_planes and rest.size >= stop_fraction * labels.size:
-        found = ransac_plane(points, threshold=threshold, rng=rng)
+    least = config.stop_fraction * labels.size
+    while len(planes) < config.max_planes and rest.size >= least:
+        found = ransac_plane(points, threshold=config.distance_threshold, rng=rng)
         if found is None:
             break
         plane, inliers = found

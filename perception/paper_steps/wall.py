@@ -1,5 +1,6 @@
 """Which plane is the wall, and the tile laid on it."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -52,13 +53,10 @@ def find_wall(
     """
     validate(config, "segmentation")
     p_WQs = p_WQs[:, finite_points(p_WQs)]
-    _, planes = segment_planes(
-        p_WQs,
-        threshold=min(config.distance_threshold, _FIRST_LOOK_THRESHOLD),
-        stop_fraction=config.stop_fraction,
-        max_planes=config.max_planes,
-        rng=np.random.default_rng(seed),
-    )
+    threshold = min(config.distance_threshold, _FIRST_LOOK_THRESHOLD)
+    fine = dataclasses.replace(config, distance_threshold=threshold)
+    rng = np.random.default_rng(seed)
+    _, planes = segment_planes(p_WQs, config=fine, rng=rng)
     total = p_WQs.shape[1]
     number = choose_plane(
         planes, X_WT_expected, tile, total=total, config=config, up_W=up_W

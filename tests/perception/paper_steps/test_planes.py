@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from perception.config import SegmentationConfig
 from perception.paper_steps.planes import fit_plane, ransac_plane, segment_planes
 
 
@@ -84,7 +85,7 @@ def three_planes(rng):
 def test_planes_come_largest_first_with_their_points():
     rng = np.random.default_rng(3)
     labels, planes = segment_planes(
-        three_planes(rng), threshold=0.03, stop_fraction=0.005, max_planes=20, rng=rng
+        three_planes(rng), config=SegmentationConfig(), rng=rng
     )
     np.testing.assert_array_equal(labels, np.repeat([1, 2, 3], [5000, 2000, 800]))
     assert [plane.count for plane in planes] == [5000, 2000, 800]
@@ -93,7 +94,7 @@ def test_planes_come_largest_first_with_their_points():
 def test_planes_end_at_the_given_number():
     rng = np.random.default_rng(3)
     labels, planes = segment_planes(
-        three_planes(rng), threshold=0.03, stop_fraction=0.005, max_planes=2, rng=rng
+        three_planes(rng), config=SegmentationConfig(max_planes=2), rng=rng
     )
     assert len(planes) == 2
     np.testing.assert_array_equal(labels[7000:], 0)
@@ -103,7 +104,7 @@ def test_planes_end_when_less_than_the_share_is_left():
     rng = np.random.default_rng(3)
     # 800 of 7800 points are 10.3 %: below 11 % the third plane is not looked for.
     _, planes = segment_planes(
-        three_planes(rng), threshold=0.03, stop_fraction=0.11, max_planes=20, rng=rng
+        three_planes(rng), config=SegmentationConfig(stop_fraction=0.11), rng=rng
     )
     assert len(planes) == 2
 
@@ -112,11 +113,7 @@ def test_same_seed_same_planes():
     points = np.random.default_rng(4).uniform(-1.0, 1.0, (3, 6000))
     results = [
         segment_planes(
-            points,
-            threshold=0.03,
-            stop_fraction=0.005,
-            max_planes=20,
-            rng=np.random.default_rng(7),
+            points, config=SegmentationConfig(), rng=np.random.default_rng(7)
         )
         for _ in range(2)
     ]
