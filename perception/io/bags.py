@@ -3,7 +3,7 @@
 The driver is native code that a damaged file may crash or hang, so it runs in a process
 of its own:
 
-    python -m perception.io.bags RECORDING FRAMES.npz
+    python -m perception.io.bags RECORDING FOLDER
 """
 
 import importlib.util
@@ -20,12 +20,13 @@ import numpy as np
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.errors import CloudReadError
 from perception.ground import FloatArray
-from perception.io.camera_file import RecordedCamera
+from perception.io.camera_file import CAMERA_FILE, read_camera, write_camera
 from perception.io.clouds import check_file, checked_points
 from perception.io.depth_images import MAX_FRAMES, median_depth
 
 # librealsense records ROS 1 bags, from 2.58 on ROS 2 ones; it plays both.
 BAG_SUFFIXES = (".bag", ".db3")
+_DEPTH_FILE = "depth.npy"
 _TIMEOUT = 25.0  # s
 _FRAME_WAIT_MS = 2000
 
@@ -44,26 +45,22 @@ def read_bag(path: Path) -> FloatArray:
         CloudReadError: The file is missing or unusable, or pyrealsense2 is not
             installed; names the reason.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        frames = Path(folder) / "frames.npz"
-        play_apart("perception.io.bags", path, frames, timeout=_TIMEOUT)
-        with np.load(frames) as content:
-            depth, numbers = content["depth"], content["camera"]
-    height, width = depth.shape
-    fx, fy, cx, cy, scale = map(float, numbers)
-    intrinsics = CameraIntrinsics(fx, fy, cx, cy, width, height)
-    camera = RecordedCamera(intrinsics, scale)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        play_apart("perception.io.bags", path, folder, timeout=_TIMEOUT)
+        camera = read_camera(folder / CAMERA_FILE)
+        depth = np.load(folder / _DEPTH_FILE)
     return checked_points(path, camera.points(depth))
 
 
-def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
+def play_apart(module: str, path: Path, folder: Path, *, timeout: float) -> None:
     """Plays a recording in a process of its own.
 
     Args:
-        module: Program to run, with the paths of recording and result. Its last line on
+        module: Program to run, with the paths of recording and folder. Its last line on
             stderr says why it failed.
         path: A `.bag` or `.db3` file.
-        out: Path of the result.
+        folder: Existing folder of the result.
         timeout: Kills the process after this time, s.
 
     Raises:
@@ -77,7 +74,7 @@ def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
             "install it with: pip install 'painter[hardware]'.",
             code="PNT-FRAMES-001",
         )
-    words = [sys.executable, "-m", module, str(path), str(out)]
+    words = [sys.executable, "-m", module, str(path), str(folder)]
     try:
         done = subprocess.run(words, capture_output=True, timeout=timeout, check=False)
     except subprocess.TimeoutExpired as error:
@@ -85,7 +82,7 @@ def play_apart(module: str, path: Path, out: Path, *, timeout: float) -> None:
             f"{path}: librealsense did not finish within {timeout:g} s.",
             code="PNT-FRAMES-002",
         ) from error
-    if done.returncode != 0 or not out.exists():
+    if done.returncode != 0:
         reason = done.stderr.decode(errors="replace").strip().splitlines()
         raise CloudReadError(
             f"{path}: librealsense cannot read the recording: "
@@ -137,7 +134,7 @@ def main_apart(play: Callable[[str, Path], None]) -> None:
     """Plays a recording as the program that `play_apart` starts.
 
     Args:
-        play: Gets the paths of recording and result; its RuntimeError or ValueError
+        play: Gets the paths of recording and folder; its RuntimeError or ValueError
             says why it failed.
     """
     try:
@@ -146,8 +143,8 @@ def main_apart(play: Callable[[str, Path], None]) -> None:
         raise SystemExit(" ".join(str(error).split())) from None
 
 
-def _play(path: str, out: Path) -> None:
-    """Plays a recording; writes the depth in units and the camera's numbers."""
+def _play(path: str, folder: Path) -> None:
+    """Plays a recording; writes its depth in units and its camera."""
     import pyrealsense2 as rs
 
     frames: list[Any] = []
@@ -155,8 +152,8 @@ def _play(path: str, out: Path) -> None:
         scale = frame.get_units()
         camera = intrinsics_of(frame)
         frames.append(np.array(frame.get_data()))
-    numbers = np.array([camera.fx, camera.fy, camera.cx, camera.cy, scale])
-    np.savez(out, depth=median_depth(frames), camera=numbers)
+    write_camera(folder / CAMERA_FILE, camera, scale)
+    np.save(folder / _DEPTH_FILE, median_depth(frames))
 
 
 if __name__ == "__main__":
