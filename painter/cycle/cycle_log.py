@@ -9,9 +9,7 @@ from painter.planning.arm.kinematics import ArmKinematics
 from painter.planning.spray_path import PaintProgram
 from painter.run.folder.values import Executed
 from painter.systems.simulated.paint_film import FilmState
-from painter.systems.values import (
-    CycleStatus,
-)
+from painter.systems.values import CycleStatus
 from perception.ground import FloatArray
 from perception.values import SurfaceMap, WallSegmentation
 

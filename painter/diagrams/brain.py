@@ -5,7 +5,6 @@ from typing import TypedDict, Unpack
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
-from pydrake.systems.sensors import ImageDepth16U
 
 from painter.config import Scenario
 from painter.planning.program.remainder import Remainder
@@ -14,7 +13,7 @@ from painter.robot.planners import MakeFreeMotionPlanner, MakeProgramPlanner
 from painter.robot.robot_model import RobotModel
 from painter.systems.brain.camera_pose import CameraPose
 from painter.systems.brain.known_result import KnownResult
-from painter.systems.brain.map_accumulator import MapAccumulator
+from painter.systems.brain.map_accumulator import ACCUMULATOR_INPUTS, MapAccumulator
 from painter.systems.brain.motion_planner import MotionPlanner
 from painter.systems.brain.paint_cycle import PaintCycle
 from painter.systems.brain.path_follower import PathFollower
@@ -66,13 +65,6 @@ CONNECTIONS = (
     *((f"{stage}.result", f"paint_cycle.{stage}") for stage in STAGES),
     *(("paint_cycle.request", f"{stage}.request") for stage in STAGES),
 )
-ACCUMULATOR_INPUTS = {
-    "depth_image": ImageDepth16U(),
-    "image_time": 1,
-    "X_WC": RigidTransform(),
-    "wall": StageResult(),
-    "enabled": 1,
-}
 # A camera may be silent for up to 3 s before it counts as missing, s.
 JOINT_HISTORY = 4.0
 

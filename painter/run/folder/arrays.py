@@ -22,7 +22,7 @@ _MAP_FIELDS = ("x", "y", "z", "nx", "ny", "nz")
 _MAP_COMMENT = "Painter map: points and normals in the world frame W, m"
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Writes a file so that it is there whole or not at all.
 
     Args:

@@ -254,7 +254,9 @@ class RunFolder:
 
     def write_text(self, name: str, text: str) -> None:
         """Writes a text file whole or not at all."""
-        arrays.write_whole(self.path / name, lambda draft: _write_text(draft, text))
+        arrays.write_whole(
+            self.path / name, lambda draft: draft.write_text(text, "utf-8")
+        )
 
     def _read(self, name: str, read: Callable[[Path], T]) -> T | None:
         path = self.path / name
@@ -290,10 +292,6 @@ def _read_text(path: Path) -> str:
         raise InputError(
             f"{path}: cannot be read ({error}).", code="PNT-RUN-022"
         ) from error
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:

@@ -3,13 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, State
 from pydrake.systems.sensors import ImageDepth16U
 
 from painter.planning.config import TileConfig
-from painter.systems.ports import EvalAs
+from painter.systems.ports import DeclareInputs, EvalAs
 from painter.systems.value_system import ValueSystem
 from painter.systems.values import StageResult
 from perception.config import MapConfig
@@ -18,6 +17,14 @@ from perception.ground import FrozenValue
 from perception.mapping.config import PoseGraphConfig
 from perception.mapping.sessions.live_map import LiveMap
 from perception.values import Wall
+
+ACCUMULATOR_INPUTS = {
+    "depth_image": ImageDepth16U(),
+    "image_time": 1,
+    "X_WC": RigidTransform(),
+    "wall": StageResult(),
+    "enabled": 1,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,13 +102,11 @@ class MapAccumulator(ValueSystem):
         if not (np.isfinite(period) and period > 0.0):
             raise ValueError(f"period must be > 0 s, got {period!r}.")
         # Inputs.
-        self._depth_port = self.DeclareAbstractInputPort(
-            "depth_image", Value(ImageDepth16U(intrinsics.width, intrinsics.height))
-        )
-        self._time_port = self.DeclareVectorInputPort("image_time", 1)
-        self._pose_port = self.DeclareAbstractInputPort("X_WC", Value(RigidTransform()))
-        self._wall_port = self.DeclareAbstractInputPort("wall", Value(StageResult()))
-        self._enabled_port = self.DeclareVectorInputPort("enabled", 1)
+        image = ImageDepth16U(intrinsics.width, intrinsics.height)
+        ports = DeclareInputs(self, ACCUMULATOR_INPUTS | {"depth_image": image})
+        self._depth_port, self._time_port = ports["depth_image"], ports["image_time"]
+        self._pose_port, self._wall_port = ports["X_WC"], ports["wall"]
+        self._enabled_port = ports["enabled"]
         # State.
         empty = LiveMap.empty(
             X_WT, (tile.width, tile.height), config, intrinsics, pose_graph
