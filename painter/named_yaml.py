@@ -8,6 +8,7 @@ import yaml
 
 from painter.errors import InputError
 from painter.resources import models_path
+from painter.typed_yaml import load_yaml
 
 
 def read_named(
@@ -35,7 +36,7 @@ def read_named(
                 code="PNT-FILE-001",
             )
     try:
-        document = yaml.safe_load(path.read_text())
+        document = load_yaml(path.read_text())
     except FileNotFoundError:
         raise InputError(f"{path}: no such {kind} file.", code="PNT-FILE-002") from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import cattrs
+import yaml
 from cattrs.cols import list_structure_factory
 from cattrs.errors import IterableValidationNote
 from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn
@@ -28,6 +29,26 @@ _EXPECTED = {
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
 CONVERTER = cattrs.Converter()
 """Builds the values; a module may register how further types are read."""
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """Refuses a key that stands twice, of which PyYAML would take the last."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        """Returns the mapping of a node."""
+        keys = [self.construct_object(key) for key, _ in node.value]
+        for number, key in enumerate(keys):
+            if key in keys[:number]:
+                mark = node.value[number][0].start_mark
+                raise yaml.constructor.ConstructorError(
+                    problem=f"{key} stands twice", problem_mark=mark
+                )
+        return super().construct_mapping(node, deep)
+
+
+def load_yaml(text: str) -> Any:
+    """Returns the data of a YAML text; raises yaml.YAMLError, also for a double key."""
+    return yaml.load(text, _StrictLoader)
 
 
 def read_typed(schema: type[T], data: object) -> T:

@@ -131,7 +131,11 @@ ROOMS: dict[str, set[str]] = {
     "painter.timebase": set(),
     "painter.typed_yaml": set(),
     "painter.resources": {"painter_models"},
-    "painter.named_yaml": {"painter.errors", "painter.resources"},
+    "painter.named_yaml": {
+        "painter.errors",
+        "painter.resources",
+        "painter.typed_yaml",
+    },
     "painter.planning.config": set(),
     "painter.planning": PLANNING_VALUES,
     "painter.planning.arm": PLANNING_VALUES

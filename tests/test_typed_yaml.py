@@ -6,7 +6,7 @@ import enum
 import pytest
 import yaml
 
-from painter.typed_yaml import read_typed
+from painter.typed_yaml import load_yaml, read_typed
 
 
 class Colour(enum.StrEnum):
@@ -99,3 +99,16 @@ def test_an_error_names_field_value_and_what_is_expected(data, message):
     with pytest.raises(ValueError) as caught:
         read_typed(Whole, data)
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    "text", ["a: 1\nb: 2\na: 3\n", "top:\n  a: 1\n  a: 1\n", "- {x: 1, x: 2}\n"]
+)
+def test_a_key_that_stands_twice_is_refused_with_its_place(text):
+    with pytest.raises(yaml.YAMLError, match=r"(?s)(a|x) stands twice.*line \d"):
+        load_yaml(text)
+
+
+def test_merged_keys_may_be_overridden():
+    data = load_yaml("base: &base {a: 1, b: 2}\nown: {<<: *base, b: 3}\n")
+    assert data["own"] == {"a": 1, "b": 3}

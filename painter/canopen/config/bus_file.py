@@ -8,7 +8,7 @@ from painter.canopen.config.bus_config import BusConfig, DriveConfig, HomingKind
 from painter.canopen.config.device import DeviceDescription, Mode
 from painter.canopen.config.units import AXES, VelocityUnit
 from painter.errors import InputError
-from painter.typed_yaml import read_typed
+from painter.typed_yaml import load_yaml, read_typed
 
 
 def load_bus(path: Path) -> BusConfig:
@@ -25,7 +25,7 @@ def load_bus(path: Path) -> BusConfig:
             range, or a drive does not support it; names file and field.
     """
     try:
-        data = yaml.safe_load(path.read_text())
+        data = load_yaml(path.read_text())
         if isinstance(data, dict) and "path" in data:
             raise ValueError("path is unknown: the reader sets it.")
         bus = read_typed(BusConfig, data)
