@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import output_folder, print_result
 from painter.errors import InputError
 from perception.settings import validate
@@ -40,11 +40,11 @@ BoardOption = Annotated[
 
 def calibrate(
     frames: FramesArgument,
-    out: options.Out,
+    out: common.Out,
     board: BoardOption = None,
-    scenario: options.Scenario = "blank",
-    overrides: options.Set = None,
-    as_json: options.Json = False,
+    scenario: common.Scenario = "blank",
+    overrides: common.Set = None,
+    as_json: common.Json = False,
 ) -> None:
     """Calibrate the camera's mount from pictures and joint positions.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from painter.canopen.analysis.kinds import Kind
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import output_folder, print_result, read_bus
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ ReplayOption = Annotated[
 
 def canlog(
     log: LogArgument,
-    bus_file: options.Bus = None,
+    bus_file: common.Bus = None,
     changes: ChangesOption = False,
     nodes: NodeOption = None,
     kinds: KindOption = None,
@@ -66,7 +66,7 @@ def canlog(
     until: UntilOption = None,
     summary: SummaryOption = False,
     replay: ReplayOption = None,
-    as_json: options.Json = False,
+    as_json: common.Json = False,
 ) -> None:
     """Show a log of the bus in CiA 301 and CiA 402 terms, or its figures.
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import fail_unless_done, print_run, progress, read_bus
 from painter.errors import InputError
 
@@ -49,21 +49,21 @@ AheadOption = Annotated[
 
 
 def deploy(
-    scenario: options.ScenarioArgument = None,
-    out: options.RunFolder = Path("runs/deploy"),
-    bus_file: options.Bus = None,
-    interface: options.Interface = None,
-    channel: options.Channel = None,
+    scenario: common.ScenarioArgument = None,
+    out: common.RunFolder = Path("runs/deploy"),
+    bus_file: common.Bus = None,
+    interface: common.Interface = None,
+    channel: common.Channel = None,
     camera: CameraOption = None,
-    overrides: options.Set = None,
-    resume: options.Resume = None,
+    overrides: common.Set = None,
+    resume: common.Resume = None,
     dry_run: DryRunOption = False,
     speed: SpeedOption = 1.0,
     step: StepOption = False,
     log_bus: LogBusOption = False,
     ahead: AheadOption = 0.4,
-    rate: options.Rate = 1.0,
-    as_json: options.Json = False,
+    rate: common.Rate = 1.0,
+    as_json: common.Json = False,
 ) -> None:
     """Paint with the robot: check, look, scan, segment, plan, paint, report.
 

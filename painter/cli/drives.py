@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from painter.canopen.sim.faults import Fault
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import print_result, read_bus
 from painter.errors import InputError
 
@@ -40,7 +40,7 @@ WorldOption = Annotated[
         metavar="NAME",
         help="Simulate the arm on the motors and the scene of this scenario, with "
         "camera and paint.  [default: motors only]",
-        autocompletion=options.complete_scenario,
+        autocompletion=common.complete_scenario,
     ),
 ]
 CameraOption = Annotated[
@@ -67,16 +67,16 @@ DurationOption = Annotated[
 
 def drives(
     bus_file: BusArgument = None,
-    interface: options.Interface = None,
-    channel: options.Channel = None,
+    interface: common.Interface = None,
+    channel: common.Channel = None,
     faults: FaultOption = None,
     scenario: WorldOption = None,
-    overrides: options.Set = None,
+    overrides: common.Set = None,
     camera: CameraOption = CAMERA_SOCKET,
     truth: TruthOption = None,
-    rate: options.Rate = 1.0,
+    rate: common.Rate = 1.0,
     duration: DurationOption = None,
-    as_json: options.Json = False,
+    as_json: common.Json = False,
 ) -> None:
     """Run simulated drives and the I/O node of a bus file on a CAN interface.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import output_folder, print_result, progress
 from painter.errors import InputError
 from perception.settings import validate
@@ -67,7 +67,7 @@ MapSetOption = Annotated[
 
 def map(
     frames: FramesArgument,
-    out: options.Out,
+    out: common.Out,
     poses: PosesOption = None,
     use_poses: UsePosesOption = True,
     store: StoreOption = None,
@@ -75,7 +75,7 @@ def map(
     mesh: MeshOption = False,
     voxels: VoxelsOption = None,
     overrides: MapSetOption = None,
-    as_json: options.Json = False,
+    as_json: common.Json = False,
 ) -> None:
     """Map a recorded RGB-D sequence: correct its poses and fuse one surface.
 

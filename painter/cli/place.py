@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import output_folder, parse_zones, print_result
 from painter.errors import InputError
 
@@ -30,14 +30,14 @@ SceneOption = Annotated[
 
 
 def place(
-    out: options.Out,
+    out: common.Out,
     wall: WallOption = None,
     scene: SceneOption = None,
-    include: options.Include = None,
-    exclude: options.Exclude = None,
-    scenario: options.Scenario = "blank",
-    overrides: options.Set = None,
-    as_json: options.Json = False,
+    include: common.Include = None,
+    exclude: common.Exclude = None,
+    scenario: common.Scenario = "blank",
+    overrides: common.Set = None,
+    as_json: common.Json = False,
 ) -> None:
     """Propose base positions for a wall, from the arm's reach.
 

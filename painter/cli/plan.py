@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import (
     output_folder,
     parse_corners,
@@ -50,16 +50,16 @@ MarkOption = Annotated[
 
 def plan(
     segmentation: SegmentationArgument,
-    out: options.Out,
-    scenario: options.Scenario = "cubes",
-    overrides: options.Set = None,
+    out: common.Out,
+    scenario: common.Scenario = "cubes",
+    overrides: common.Set = None,
     expected_wall: ExpectedWallOption = False,
     from_stroke: FromStrokeOption = 1.0,
     touch_up: TouchUpOption = None,
     mark: MarkOption = None,
-    include: options.Include = None,
-    exclude: options.Exclude = None,
-    as_json: options.Json = False,
+    include: common.Include = None,
+    exclude: common.Exclude = None,
+    as_json: common.Json = False,
 ) -> None:
     """Plan the paint program of a segmented wall.
 

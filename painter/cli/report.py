@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import print_result
 
 FolderArgument = Annotated[
@@ -13,7 +13,7 @@ FolderArgument = Annotated[
 ]
 
 
-def report(folder: FolderArgument, as_json: options.Json = False) -> None:
+def report(folder: FolderArgument, as_json: common.Json = False) -> None:
     """Rebuild report.json and report.html of a run from its other files.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import output_folder, print_result
 from painter.errors import InputError
 
@@ -114,7 +114,7 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Random seed of RANSAC.")]
 
 def segment(
     cloud: CloudArgument,
-    out: options.Out,
+    out: common.Out,
     intrinsics: IntrinsicsOption = None,
     up: UpOption = None,
     unit: UnitOption = Unit.M,
@@ -126,9 +126,9 @@ def segment(
     fine: FineOption = False,
     distance: DistanceOption = None,
     max_range: MaxRangeOption = None,
-    overrides: options.Set = None,
+    overrides: common.Set = None,
     seed: SeedOption = 1,
-    as_json: options.Json = False,
+    as_json: common.Json = False,
 ) -> None:
     """Segment a recorded cloud or depth image into wall and other regions.
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from painter.cli import options
+from painter.cli import common
 from painter.cli.common import fail_unless_done, parse_corners, print_run, progress
 from painter.errors import InputError
 
@@ -45,17 +45,17 @@ ClearOption = Annotated[
 
 
 def simulate(
-    scenario: options.ScenarioArgument = None,
-    out: options.RunFolder = Path("runs/latest"),
-    overrides: options.Set = None,
+    scenario: common.ScenarioArgument = None,
+    out: common.RunFolder = Path("runs/latest"),
+    overrides: common.Set = None,
     seed: SeedOption = None,
     meshcat: MeshcatOption = False,
     replay: ReplayOption = True,
     stop_at_stroke: StopOption = None,
-    resume: options.Resume = None,
+    resume: common.Resume = None,
     touch_up: TouchUpOption = None,
     clear: ClearOption = None,
-    as_json: options.Json = False,
+    as_json: common.Json = False,
 ) -> None:
     """Simulate a whole paint cycle: look, scan, segment, plan, paint, report.
 

@@ -8,7 +8,7 @@ from importlib.metadata import version
 import pytest
 import typer
 
-from painter.cli import main, options
+from painter.cli import common, main
 from painter.cli.common import fail_unless_done, print_result
 from painter.errors import FaultError, InputError, PainterError
 from perception.errors import CloudReadError, NoWallError
@@ -83,7 +83,7 @@ def test_errors_of_painters_own_are_one_line(error, code, command, capsys):
 
 
 def test_with_json_an_error_is_one_object_on_stdout(command, capsys):
-    def plan(as_json: options.Json = False) -> None:
+    def plan(as_json: common.Json = False) -> None:
         """Plan."""
         raise InputError("cloud.ply: no\nsuch file.", code="PNT-TEST-001")
 
@@ -110,7 +110,7 @@ def test_with_json_an_error_is_one_object_on_stdout(command, capsys):
 def test_with_json_wrong_use_and_interrupts_have_codes_too(
     words, status, code, command, capsys
 ):
-    def plan(as_json: options.Json = False) -> None:
+    def plan(as_json: common.Json = False) -> None:
         """Plan."""
         raise KeyboardInterrupt
 
@@ -125,7 +125,7 @@ def test_with_json_wrong_use_and_interrupts_have_codes_too(
 def test_a_job_that_failed_prints_its_figures_and_no_second_object(command, capsys):
     figures = {"result": "FAULT", "cause": "drive 2.", "code": "PNT-TEST-001"}
 
-    def plan(as_json: options.Json = False) -> None:
+    def plan(as_json: common.Json = False) -> None:
         """Plan."""
         print_result(figures, as_json=as_json)
         fail_unless_done(figures)
