@@ -537,3 +537,25 @@ def test_the_paint_cycle_loads_without_bus_and_camera_packages():
     code = f"import sys; {blocked}import painter.diagrams.paint_cycle"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_tests_bind_no_private_names():
+    tuple_names = {"_replace", "_asdict", "_fields", "_make"}  # Of named tuples.
+    bad = []
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = []
+            if isinstance(node, ast.ImportFrom):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.Attribute):
+                own = isinstance(node.value, ast.Name) and node.value.id in (
+                    "self",
+                    "cls",
+                )
+                names = [] if own else [node.attr]
+            bad += [
+                f"{path.relative_to(ROOT)}:{node.lineno} binds {name}"
+                for name in names
+                if name[0] == "_" and name[:2] != "__" and name not in tuple_names
+            ]
+    assert bad == []

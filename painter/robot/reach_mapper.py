@@ -71,14 +71,20 @@ class ReachMapper:
             self.limits,
             tile,
             self.task,
-            is_free=self._IsFreeBefore(distance, raised),
+            is_free=self.IsFreeBefore(distance, raised),
             step=step,
             around=around,
         )
 
-    def _IsFreeBefore(
+    def IsFreeBefore(
         self, distance: float, raised: float
     ) -> Callable[[np.ndarray], np.ndarray]:
+        """Returns the collision check of joint positions (n, 5) before a bare wall.
+
+        Args:
+            distance: Of the wall from the base axis, m.
+            raised: How much higher than modelled the shoulder is, m.
+        """
         checker = self._checker
         world, thickness = checker.plant().world_body(), 0.1
         checker.RemoveAllAddedCollisionShapes()

@@ -139,7 +139,7 @@ def render_sequence(
     times, truth, arm = _poses(config, np.random.default_rng([seed, 2]))
     for number, (time, X_WC, X_arm) in enumerate(zip(times, truth, arm, strict=True)):
         rng = np.random.default_rng([seed, 3, number])
-        depth, x, y = _cast(X_WC, intrinsics, solid)
+        depth, x, y = cast_rays(X_WC, intrinsics, solid)
         depth_mm = model.measure(depth, depth, rng)
         color = _look_up(picture, x, y, rng)
         yield Frame(float(time), depth_mm, color, X_arm), X_WC
@@ -221,10 +221,15 @@ def _wall_picture(kind: WallKind, rng: np.random.Generator) -> FloatImage:
     return np.clip(picture, 5.0, 250.0)
 
 
-def _cast(
+def cast_rays(
     X_WC: RigidTransform, intrinsics: CameraIntrinsics, solid: bool
 ) -> tuple[FloatImage, FloatImage, FloatImage]:
     """Casts every pixel's ray.
+
+    Args:
+        X_WC: Pose of the camera.
+        intrinsics: Of the camera.
+        solid: Whether the wall has its recess and boxes.
 
     Returns:
         Depth along C's z (H, W), m, and x and y of what is hit, in T.

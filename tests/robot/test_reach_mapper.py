@@ -26,7 +26,7 @@ def test_the_raster_and_the_scan_lie_within_reach_all_over(mapper):
     """Nozzle over x 0.06..1.94, y -0.10..2.10; camera over the four rows."""
     scenario = Scenario()
     X_WT = nominal_tile_pose(scenario.tile)
-    is_free = mapper._IsFreeBefore(scenario.tile.distance, 0.0)
+    is_free = mapper.IsFreeBefore(scenario.tile.distance, 0.0)
     ahead = np.array([1.0, 0.0, 0.0])
     picture = mapper.task.footprint
     margin = scenario.scan.margin

@@ -23,7 +23,7 @@ _MCL_CURRENT_AND_FUTURE = 3
 _PR_SET_TIMERSLACK = 29
 # Source: Linux, Documentation/power/pm_qos_interface.rst: an int32 of microseconds that
 # holds while the file is open.
-_WAKE_UP_LATENCY = "/dev/cpu_dma_latency"
+WAKE_UP_LATENCY = "/dev/cpu_dma_latency"
 _KEPT = 12_000  # A minute at 200 Hz; sorting them takes less than a cycle.
 
 
@@ -77,7 +77,7 @@ def stay_awake() -> Iterator[bool]:
         Whether that is allowed; if not, it is logged.
     """
     try:
-        file = os.open(_WAKE_UP_LATENCY, os.O_WRONLY)
+        file = os.open(WAKE_UP_LATENCY, os.O_WRONLY)
     except OSError as error:
         _LOGGER.info("idle processors may sleep: %s", error)
         yield False

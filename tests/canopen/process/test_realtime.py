@@ -105,7 +105,7 @@ def test_processors_are_asked_to_stay_awake_for_as_long_as_it_matters(
     monkeypatch, tmp_path
 ):
     file = tmp_path / "cpu_dma_latency"
-    monkeypatch.setattr(realtime, "_WAKE_UP_LATENCY", str(file))
+    monkeypatch.setattr(realtime, "WAKE_UP_LATENCY", str(file))
     with realtime.stay_awake() as is_awake:
         assert not is_awake  # No such file: as on a machine that is not Linux.
     file.write_bytes(b"")

@@ -9,7 +9,7 @@ from perception.depth_camera.depth import CameraIntrinsics
 from perception.synthetic.sequences import (
     SequenceConfig,
     WallKind,
-    _cast,
+    cast_rays,
     distance_to_surface,
     render_sequence,
 )
@@ -36,7 +36,9 @@ def test_recess_and_boxes_are_cast_at_their_depth():
     at = {(1.05, 1.2): 0.82, (0.325, 0.4): 0.64, (1.62, 1.25): 0.66, (1.9, 0.2): 0.7}
     for (x, y), depth in at.items():
         looking = RigidTransform(np.diag([1.0, -1.0, -1.0, 1.0])).rotation()
-        cast, hit_x, hit_y = _cast(RigidTransform(looking, [x, y, 0.7]), camera, True)
+        cast, hit_x, hit_y = cast_rays(
+            RigidTransform(looking, [x, y, 0.7]), camera, True
+        )
         assert cast[240, 424] == pytest.approx(depth, abs=1e-4)
         assert (hit_x[240, 424], hit_y[240, 424]) == pytest.approx((x, y), abs=2e-3)
 
@@ -46,7 +48,7 @@ def test_what_is_cast_lies_on_a_surface():
     looking = RotationMatrix(np.diag([1.0, -1.0, -1.0]))
     R_WC = looking @ RollPitchYaw(0.1, -0.2, 0.3).ToRotationMatrix()
     X_WC = RigidTransform(R_WC, [1.0, 1.0, 0.9])
-    depth, x, y = _cast(X_WC, camera, True)
+    depth, x, y = cast_rays(X_WC, camera, True)
     u = (np.arange(camera.width) - camera.cx) / camera.fx
     v = (np.arange(camera.height) - camera.cy)[:, None] / camera.fy
     rays = np.stack([*np.broadcast_arrays(u, v), np.ones_like(depth)])
