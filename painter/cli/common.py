@@ -169,7 +169,7 @@ def print_error(message: str, code: str) -> None:
 
 
 def fail_unless_done(figures: Mapping[str, Any]) -> None:
-    """Ends a command whose printed figures are of a run that did not come to DONE.
+    """Ends a command whose printed figures are of a run that did not reach DONE.
 
     The cause is one line on stderr; on stdout there are the figures already.
     """

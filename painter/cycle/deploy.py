@@ -52,7 +52,7 @@ def DeployCycle(
         own: Systems of one's own; see `MakePaintCycle`.
 
     Returns:
-        The log of the cycle, whether it came to DONE or not; without film and
+        The log of the cycle, whether it reached DONE or not; without film and
         clearances, which only a simulator knows.
 
     Raises:
@@ -94,7 +94,7 @@ def DeployCycle(
 
 
 def _Advance(run: RunningCycle, connection: RobotConnection, time: float) -> None:
-    """Advances to a time, one bus cycle on, when the robot's clock comes to it.
+    """Advances to a time, one bus cycle on, when the robot's clock reaches it.
 
     If the arm stood before, its clock stops for a long computation: the first commands
     of the motion planned in it are then still ahead of their time of execution.

@@ -37,7 +37,7 @@ class RunningCycle:
         Args:
             cycle: The cycle.
             logged: Vector outputs of the cycle to log, and the period of each, s.
-            watch: See `Watch`; None = nobody watches.
+            watch: See `Watch`; None = no watcher.
         """
         self.cycle = cycle
         self._watch = watch

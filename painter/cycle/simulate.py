@@ -41,7 +41,7 @@ def SimulateCycle(
         own: Systems of one's own; see `MakePaintCycle`.
 
     Returns:
-        The log of the cycle, whether it came to DONE or not.
+        The log of the cycle, whether it reached DONE or not.
     """
     cycle = MakePaintCycle(
         scenario, remainder=remainder, film=film, meshcat=meshcat, **own

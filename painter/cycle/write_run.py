@@ -66,7 +66,7 @@ def end_run(folder: RunFolder, log: CycleLog, *, start: float) -> Run:
         start: `time.perf_counter()` when the program began the run, s.
 
     Returns:
-        The run; it is complete if the cycle came to DONE.
+        The run; it is complete if the cycle reached DONE.
     """
     finish_run(
         folder,

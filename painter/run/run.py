@@ -42,7 +42,7 @@ class Run:
 
     @property
     def is_complete(self) -> bool:
-        """True if the cycle came to DONE and everything was written."""
+        """True if the cycle reached DONE and everything was written."""
         return self._folder.is_complete
 
     @cached_property

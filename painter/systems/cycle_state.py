@@ -45,7 +45,7 @@ SEQUENCE = (
     CycleStep(Phase.PAINT, Action.PAINT),
     CycleStep(Phase.RETRACT, Action.MOVE, "retract"),
 )
-# A wall known from an earlier run is neither looked at nor scanned.
+# A wall known from an earlier run needs no LOOK and no SCAN.
 KNOWN_WALL_SEQUENCE = tuple(
     step
     for step in SEQUENCE

@@ -73,7 +73,7 @@ class LockstepBus:
             self._step()
 
     def kill(self) -> None:
-        """Ends the master as killing its process would: nobody steps it any more."""
+        """Ends the master as killing its process would: nothing steps it any more."""
         self.master = None
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ HALF_COVERED = 0.5  # Share of nominal.
 
 
 def film_figures(film: Film, *, nominal: float, fan_width: float) -> dict:
-    """Coverage, uniformity, overspray and soiled keep-out.
+    """Coverage, uniformity, overspray and paint on keep-out.
 
     Args:
         film: The film.

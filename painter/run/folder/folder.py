@@ -128,7 +128,7 @@ class RunFolder:
 
     @property
     def is_complete(self) -> bool:
-        """True once the run came to DONE and all was written."""
+        """True once the run reached DONE and all was written."""
         return not (self.path / INCOMPLETE).exists()
 
     def complete(self) -> None:

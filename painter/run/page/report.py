@@ -18,7 +18,7 @@ def finish_run(
     cause: str | None = None,
     code: str | None = None,
 ) -> dict[str, Any]:
-    """Logs how a run ended, writes its report and, if it came to DONE, completes it.
+    """Logs how a run ended, writes its report and, if it reached DONE, completes it.
 
     Everything else of the run is to be in the folder before: this is the last step.
 
@@ -27,7 +27,7 @@ def finish_run(
         time: Robot time of the end, s.
         result: "DONE", "FAULT" or "ABORTED".
         wall_clock: Time the program ran, s.
-        cause: Why it did not come to DONE, one line.
+        cause: Why it did not reach DONE, one line.
         code: Stable name of that cause, "PNT-AREA-NNN".
 
     Returns:
