@@ -202,6 +202,10 @@ def _read_plant(data: object, _: type) -> MultibodyPlantConfig:
 CONVERTER.register_structure_hook(MultibodyPlantConfig, _read_plant)
 
 
+# Settings of older files, which run folders keep.
+_REMOVED = ("arm.model_name", "pose_graph.optimize_every", "raster.direction")
+
+
 def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
     """Loads a scenario by name or from a file.
 
@@ -225,7 +229,12 @@ def load_scenario(name: str, overrides: Sequence[str] = ()) -> Scenario:
         scenario = read_typed(Scenario, fields)
         validate(scenario)
     except ValueError as error:
-        raise InputError(f"{path}: {error}", code="PNT-SCENARIO-001") from error
+        # A value of --set is not in the file.
+        field = str(error).partition(" ")[0]
+        given = [o for o in overrides if o.partition("=")[0] == field]
+        source = f"--set {given[-1]}" if given else path
+        cure = " It was removed; delete the line." if field in _REMOVED else ""
+        raise InputError(f"{source}: {error}{cure}", code="PNT-SCENARIO-001") from error
     return scenario
 
 

@@ -231,3 +231,21 @@ def test_a_number_just_outside_its_bounds_is_refused_by_name(item):
     for value in (low, high):
         with pytest.raises(InputError, match=f"{item.path} must be .* got {value!r}"):
             load_scenario("blank", [f"{item.path}={value!r}"])
+
+
+def test_a_bad_value_names_where_it_was_given(tmp_path):
+    with pytest.raises(
+        InputError, match=r"^--set raster\.speed=-1: raster\.speed must"
+    ):
+        load_scenario("blank", ["raster.coats=1", "raster.speed=-1"])
+    file = tmp_path / "own.yaml"
+    file.write_text("Own:\n  raster: {speed: -1}\n")
+    with pytest.raises(InputError, match=r"own\.yaml: raster\.speed must"):
+        load_scenario(str(file), ["raster.coats=1"])
+
+
+def test_a_removed_setting_of_an_older_run_names_the_cure(tmp_path):
+    file = tmp_path / "old.yaml"
+    file.write_text("Old:\n  arm: {model_name: arm}\n")
+    with pytest.raises(InputError, match=r"arm\.model_name .*delete the line"):
+        load_scenario(str(file))
