@@ -118,7 +118,8 @@ class RunFolder:
             InputError: There is no such folder, or no run has left it.
         """
         if not path.is_dir():
-            raise InputError(f"{path}: no such folder.", code="PNT-RUN-016")
+            reason = "is a file, not a folder" if path.exists() else "no such folder"
+            raise InputError(f"{path}: {reason}.", code="PNT-RUN-016")
         if not _is_run(path):
             raise InputError(
                 f"{path}: not a run folder (no {SCENARIO} and {EVENTS}).",
