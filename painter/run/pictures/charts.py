@@ -154,7 +154,7 @@ def tracking_chart(executed: Executed, program: PaintProgram) -> Figure:
             [],
             color=style.VERMILION,
             ls="--",
-            label="bound or wanted speed on strokes",
+            label="bound or commanded speed on strokes",
         ),
     ]
     figure.legend(handles=entries, loc="outside upper right", ncols=3)
