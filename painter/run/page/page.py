@@ -1,6 +1,7 @@
 """The report page: one HTML file with everything in it, from report.html.j2."""
 
 import base64
+import itertools
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ from painter.run.figures.time_figures import (
 )
 from painter.run.folder import folder as files
 from painter.run.folder.folder import RunFolder
-from painter.run.page.catalog import FIGURES, HEADLINE, FigureInfo
+from painter.run.page.catalog import FIGURES, HEADLINE, FigureInfo, figure_info
 from painter.run.pictures import charts, pictures, style
 from painter.run.pictures.film_preview import preview_picture
 
@@ -92,8 +93,14 @@ def report_page(folder: RunFolder, figures: Mapping[str, Any]) -> str:
         last_phase=phases[-1] if phases else "",
         replay=files.SCENE,
         has_replay=(folder.path / files.SCENE).exists(),
-        headline=HEADLINE,
-        rows={info.name: _row(info, figures) for info in FIGURES},
+        headline=[
+            (title, _row(figure_info(name), figures))
+            for name, title in HEADLINE.items()
+        ],
+        groups=[
+            (group, [_row(info, figures) for info in infos])
+            for group, infos in itertools.groupby(FIGURES, lambda info: info.group)
+        ],
         timeline=list(_timeline(events)),
         wall=list(_wall(folder)),
         tracking=list(_tracking(folder)),
@@ -114,11 +121,8 @@ def _row(info: FigureInfo, figures: Mapping[str, Any]) -> dict[str, Any]:
         mark, sign, word = "", "", ""
     else:
         mark, sign, word = ("good", "✓", "met") if passes else ("bad", "✗", "missed")
-    groups = list(dict.fromkeys(one.group for one in FIGURES))
     return {
         "name": info.name,
-        "group": info.group,
-        "number": groups.index(info.group),
         "meaning": info.meaning,
         "text": info.text(figures),
         "target": info.target(),
