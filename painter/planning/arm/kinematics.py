@@ -16,6 +16,9 @@ from pydrake.math import RigidTransform
 from perception.ground import BoolArray, FloatArray, FrozenValue
 
 NQ = 5  # Joints of the arm.
+# Axes of L in T where the tool is square to the wall: L x points into it, L z up.
+SQUARE_R_TL = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+SQUARE_R_TL.flags.writeable = False
 # Largest error of X_LG and X_LC against the form that the closed-form inverse needs.
 _MOUNT_TOLERANCE = 1e-9
 

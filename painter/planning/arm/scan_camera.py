@@ -7,12 +7,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from painter.errors import InputError
+from painter.planning.arm.kinematics import SQUARE_R_TL
 from perception.config import StereoConfig
 from perception.depth_camera.depth import CameraIntrinsics
 from perception.ground import FloatArray, FrozenValue
-
-# Axes of L in T where the tool is square to the wall: L x points into it, L z up.
-_R_TL = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,7 @@ class ScanCamera(FrozenValue):
         cls, stereo: StereoConfig, X_LC: RigidTransform, *, rate: float = 5.0
     ) -> "ScanCamera":
         """Makes the camera from its pose in the last link, whose x is C z."""
-        return cls(stereo, _R_TL @ X_LC.rotation().matrix(), rate)
+        return cls(stereo, SQUARE_R_TL @ X_LC.rotation().matrix(), rate)
 
     @property
     def imagers_T(self) -> FloatArray:

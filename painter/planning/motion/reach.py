@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from painter.errors import ReachError
-from painter.planning.arm.kinematics import JOINT_NAMES, ArmLimits
+from painter.planning.arm.kinematics import JOINT_NAMES, SQUARE_R_TL, ArmLimits
 from painter.planning.motion.gun_path import WallIk
 from perception.ground import FloatArray
 
@@ -127,10 +127,9 @@ def require_reach(
 def wrist_distances(p_TGs: FloatArray, ik: WallIk) -> FloatArray:
     """Returns the shoulder-to-wrist distance (n,), m, that nozzle points (n, 3) need.
 
-    With the gun square to the wall L's axes in T are x = -z, y = -x, z = y.
+    The gun is square to the wall.
     """
-    ahead, left, above = ik.kinematics.X_LG.translation()
-    p_TLs = p_TGs - np.array([-left, above, -ahead])
+    p_TLs = p_TGs - SQUARE_R_TL @ ik.kinematics.X_LG.translation()
     p_WLs = (ik.X_WT @ p_TLs.T).T
     p_WS = np.array([0.0, 0.0, ik.kinematics.shoulder_height])
     return np.asarray(np.linalg.norm(p_WLs - p_WS, axis=1))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from painter.planning.arm.kinematics import SQUARE_R_TL
 from painter.planning.arm.scan_camera import ScanCamera
 from painter.planning.motion.transitions import TransitionPlanner
 from perception.ground import BoolArray, FloatArray
@@ -22,13 +23,10 @@ class CameraPoses:
     transitions: TransitionPlanner
 
     def nozzles(self, p_TCs: FloatArray) -> FloatArray:
-        """Returns nozzle positions (n, 3) for camera centres (n, 3), m, in T.
-
-        With the tool square to the wall L's axes in T are x = -z, y = -x, z = y.
-        """
+        """Returns nozzle positions (n, 3) for camera centres (n, 3), m, in T."""
         arm = self.transitions.ik.kinematics
-        ahead, left, above = arm.X_LG.translation() - arm.X_LC.translation()
-        return np.asarray(p_TCs + np.array([-left, above, -ahead]))
+        p_CG_L = arm.X_LG.translation() - arm.X_LC.translation()
+        return np.asarray(p_TCs + SQUARE_R_TL @ p_CG_L)
 
     def q(self, p_TCs: FloatArray) -> FloatArray:
         """Returns joint angles (n, 5), rad, for camera centres (n, 3), m, in T."""
